@@ -1,0 +1,1 @@
+"""Social navigation in recorded crowds, as a MuJoCo physics benchmark."""

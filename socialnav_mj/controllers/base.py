@@ -1,0 +1,136 @@
+"""What a controller is, and the one place where twists become wheel speeds."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.config import Scenario
+from socialnav_mj.geometry import Array, wheel_speed_of_twist
+
+Observation = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What the wheels can do; the task's `limits` property gives it to `Controller.reset`."""
+
+    max_speed: float
+    """Largest forward speed; the smallest is 0 [m/s]."""
+    max_yaw_rate: float
+    """Largest yaw rate to either side [rad/s]."""
+    wheel_radius: float
+    """[m]."""
+    track: float
+    """Distance between the wheels' contact points [m]."""
+    control_timestep: float
+    """Time between two actions [s]."""
+    contact_distance: float
+    """Distance between an agent's and a pedestrian's centre at which they touch [m]."""
+    agent_contact_distance: float
+    """Distance between two agents' centres at which they touch [m]."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Limits":
+        """Limits of a scenario's robots.
+
+        Args:
+            scenario: The resolved scenario.
+
+        Returns:
+            The limits.
+        """
+        return cls(
+            max_speed=scenario.robot.max_speed,
+            max_yaw_rate=scenario.max_yaw_rate,
+            wheel_radius=scenario.robot.wheel_radius,
+            track=scenario.robot.track,
+            control_timestep=scenario.control_timestep,
+            contact_distance=scenario.contact_distance,
+            agent_contact_distance=2.0 * scenario.robot.radius,
+        )
+
+    def wheel_speed(self, twist: Array) -> Array:
+        """Clip twists to the limits and map them to the wheels.
+
+        Args:
+            twist: (forward speed [m/s], yaw rate [rad/s]), shape (n_agents, 2).
+
+        Returns:
+            (left, right) wheel speeds, shape (n_agents, 2) [rad/s].
+        """
+        twist = np.asarray(twist, dtype=float)
+        low, high = (0.0, -self.max_yaw_rate), (self.max_speed, self.max_yaw_rate)
+        return wheel_speed_of_twist(np.clip(twist, low, high), wheel_radius=self.wheel_radius, track=self.track)
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Anything with these three members can be evaluated.
+
+    `reset` is called before each episode, `act` at each control step with the task's observation (see
+    `socialnav_mj.observation`), for all slots at once; rows of inactive slots are ignored.
+    """
+
+    name: str
+
+    def reset(self, limits: Limits, *, seed: int = 0) -> None:
+        """Forget everything and take the limits of the episode to come."""
+
+    def act(self, observation: Observation) -> Array:
+        """Wheel speeds (left, right), shape (n_agents, 2) [rad/s]."""
+
+
+class TwistController(ABC):
+    """Base of controllers that think in twists: limits and wheel mapping are done here.
+
+    Subclasses are frozen dataclasses in spirit: their fields are their configuration, plain JSON values that travel
+    in every episode. A controller that switches between policies sets `policies` and overrides `active_policy`.
+    """
+
+    name: str
+    limits: Limits
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """Names of the policies it switches between."""
+        return (self.name,)
+
+    @property
+    def active_policy(self) -> NDArray[np.int64] | None:
+        """Index into `policies` of what chose each row of the last action, shape (n_agents,); None means 0."""
+        return None
+
+    def reset(self, limits: Limits, *, seed: int = 0) -> None:
+        """Take the limits of the episode to come.
+
+        Args:
+            limits: Of the scenario's robots.
+            seed: For controllers that draw random numbers.
+        """
+        self.limits = limits
+
+    @abstractmethod
+    def twist(self, observation: Observation) -> Array:
+        """Desired twist of every agent, unclipped.
+
+        Args:
+            observation: See `socialnav_mj.observation`.
+
+        Returns:
+            (forward speed [m/s], yaw rate [rad/s]), shape (n_agents, 2); finite for finite observations.
+        """
+
+    def act(self, observation: Observation) -> Array:
+        """Wheel speeds for every agent.
+
+        Args:
+            observation: See `socialnav_mj.observation`.
+
+        Returns:
+            (left, right), shape (n_agents, 2), within the limits [rad/s].
+        """
+        return self.limits.wheel_speed(self.twist(observation))

@@ -1,0 +1,322 @@
+"""The record of everything that happened in one episode; all that comes later is made from it alone."""
+
+import json
+import os
+import zipfile
+import zlib
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+FORMAT = "socialnav_mj.episode/1"
+
+
+class Outcome(IntEnum):
+    """How an agent's run ended."""
+
+    ARRIVED = 0
+    """It came within the goal radius."""
+    TIMED_OUT = 1
+    """Its deadline passed."""
+    COLLIDED = 2
+    """It was taken out at its first collision (on_collision="retire" only)."""
+    UNFINISHED = 3
+    """The episode was stopped while it was under way."""
+    NEVER_SPAWNED = 4
+    """Its place was never free."""
+
+
+class Partner(IntEnum):
+    """Whom an agent touched."""
+
+    PEDESTRIAN = 0
+    AGENT = 1
+
+
+class EpisodeError(ValueError):
+    """A file is not an episode of ours, or is damaged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Episode:
+    """One run of one controller in one scenario.
+
+    Times are seconds since the recording's first frame. Everything sampled "per step" is taken at `time`, before the
+    action of that step; values of agents and pedestrians that are not in the scene are NaN. n is the number of agents,
+    m the number of replayed pedestrians, t the number of samples, k the number of contacts.
+    """
+
+    time: Array
+    """(t,) evenly spaced by the control time step [s]."""
+
+    agent_person: IntArray
+    """(n,) id of the person each agent replaces; ascending, unique."""
+    agent_start: Array
+    """(n, 2) where that person appeared [m]."""
+    agent_goal: Array
+    """(n, 2) where that person's track ends [m]."""
+    agent_appear_time: Array
+    """(n,) first control step at or after the person's appearance [s]."""
+    agent_spawn_time: Array
+    """(n,) real spawn, delayed while the place is taken; NaN if it never was free [s]."""
+    agent_deadline: Array
+    """(n,) counted from the real spawn; NaN if there was none [s]."""
+    agent_end_time: Array
+    """(n,) sample at which it arrived, timed out or was stopped; NaN if never spawned [s]."""
+    agent_outcome: IntArray
+    """(n,) values of `Outcome`."""
+
+    agent_position: Array
+    """(t, n, 2) from the spawn's sample to the end's, both included [m]."""
+    agent_heading: Array
+    """(t, n) [rad]."""
+    agent_velocity: Array
+    """(t, n, 2) [m/s]."""
+    agent_yaw_rate: Array
+    """(t, n) [rad/s]."""
+    agent_wheel_speed: Array
+    """(t, n, 2) (left, right) command that acts from this sample on; NaN at the end's sample [rad/s]."""
+    agent_policy: IntArray
+    """(t, n) index into `policies` of what chose that command; -1 where there is none."""
+
+    pedestrian_person: IntArray
+    """(m,) ids of the replayed people; ascending, unique."""
+    pedestrian_position: Array
+    """(t, m, 2) [m]."""
+    pedestrian_heading: Array
+    """(t, m) [rad]."""
+    pedestrian_velocity: Array
+    """(t, m, 2) [m/s]."""
+
+    contact_agent: IntArray
+    """(k,) agent index. Rows are ordered by time, then agent, then partner."""
+    contact_partner_kind: IntArray
+    """(k,) values of `Partner`."""
+    contact_partner: IntArray
+    """(k,) agent or pedestrian index. A touch between two agents stands in two rows, one from each side."""
+    contact_time: Array
+    """(k,) first physics step of the touch [s]."""
+    contact_duration: Array
+    """(k,) time from first to last touching physics step, both included [s]."""
+    contact_position: Array
+    """(k, 2) where the bodies met [m]."""
+    contact_normal: Array
+    """(k, 2) unit vector from the agent towards its partner at first touch."""
+    contact_agent_heading: Array
+    """(k,) at first touch [rad]."""
+    contact_agent_velocity: Array
+    """(k, 2) just before the touch [m/s]."""
+    contact_partner_velocity: Array
+    """(k, 2) just before the touch; a pedestrian's is the recorded one [m/s]."""
+    contact_impulse: Array
+    """(k,) integral of the normal force over the touch; NaN where there is no physics (human row) [N s]."""
+    contact_peak_force: Array
+    """(k,) largest normal force of one physics step; NaN where there is no physics [N]."""
+
+    policies: tuple[str, ...]
+    """Names that `agent_policy` indexes; the controller's name alone if it never switches."""
+    metadata: dict[str, Any]
+    """JSON values: controller and its configuration, scenario, recording (name, variant, checksum), versions,
+    state_hash."""
+
+    def __post_init__(self) -> None:
+        t, n, m, k = len(self.time), len(self.agent_person), len(self.pedestrian_person), len(self.contact_time)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, np.ndarray):
+                continue
+            shape = _expected_shape(field.name, t=t, n=n, m=m, k=k)
+            if value.shape != shape:
+                raise EpisodeError(f"{field.name} has shape {value.shape}; expected {shape}")
+            kind = "i" if field.name in _INTEGER_FIELDS else "f"
+            if value.dtype.kind != kind or value.dtype.itemsize != 8:
+                raise EpisodeError(
+                    f"{field.name} has type {value.dtype}; expected {'int64' if kind == 'i' else 'float64'}"
+                )
+            value.flags.writeable = False
+        self._check_values()
+
+    def _check_values(self) -> None:
+        n, m = len(self.agent_person), len(self.pedestrian_person)
+        if not np.all(np.isfinite(self.time)) or np.any(np.diff(self.time) <= 0.0):
+            raise EpisodeError("time must be finite and increasing")
+        for name in ("agent_person", "pedestrian_person"):
+            if np.any(np.diff(getattr(self, name)) <= 0):
+                raise EpisodeError(f"{name} must be ascending and unique")
+        if np.intersect1d(self.agent_person, self.pedestrian_person).size:
+            raise EpisodeError("a person cannot be replaced and replayed at once")
+        if not np.isin(self.agent_outcome, list(Outcome)).all():
+            raise EpisodeError(f"agent_outcome holds values outside {[int(o) for o in Outcome]}")
+        if not np.isin(self.contact_partner_kind, list(Partner)).all():
+            raise EpisodeError(f"contact_partner_kind holds values outside {[int(p) for p in Partner]}")
+        if np.any(self.agent_policy >= len(self.policies)) or np.any(self.agent_policy < -1):
+            raise EpisodeError(f"agent_policy holds values outside -1..{len(self.policies) - 1}")
+        limit = np.where(self.contact_partner_kind == Partner.AGENT, n, m)
+        if np.any((self.contact_agent < 0) | (self.contact_agent >= n)):
+            raise EpisodeError("contact_agent is out of range")
+        if np.any((self.contact_partner < 0) | (self.contact_partner >= limit)):
+            raise EpisodeError("contact_partner is out of range")
+        spawned = np.isfinite(self.agent_spawn_time)
+        if not np.array_equal(spawned, self.agent_outcome != Outcome.NEVER_SPAWNED):
+            raise EpisodeError("agent_spawn_time must be NaN for exactly the agents that never spawned")
+        present = np.isfinite(self.agent_position[..., 0])
+        after = self.time[:, None] >= self.agent_spawn_time - 1e-9
+        before = self.time[:, None] <= self.agent_end_time + 1e-9
+        if not np.array_equal(present, after & before):
+            raise EpisodeError("agent_position must be finite from spawn to end, and NaN elsewhere")
+
+    @property
+    def n_agents(self) -> int:
+        """Number of agents, spawned or not."""
+        return len(self.agent_person)
+
+    @property
+    def n_pedestrians(self) -> int:
+        """Number of replayed people."""
+        return len(self.pedestrian_person)
+
+    @property
+    def control_timestep(self) -> float:
+        """Time between two samples [s]."""
+        return float(self.metadata["scenario"]["control_timestep"])
+
+    @property
+    def agent_active(self) -> NDArray[np.bool_]:
+        """(t, n) whether an agent is in the scene and under way: from its spawn up to, not including, its end."""
+        return self.agent_policy >= 0
+
+    @property
+    def contact_closing_speed(self) -> Array:
+        """(k,) speed at which the two bodies approached along the normal just before the touch [m/s]."""
+        return np.einsum("kd,kd->k", self.contact_agent_velocity - self.contact_partner_velocity, self.contact_normal)
+
+    def window(self, agent: int) -> slice:
+        """Samples of one agent, from its spawn to its end.
+
+        Args:
+            agent: Agent index.
+
+        Returns:
+            A slice of the time axis; empty if the agent never spawned.
+        """
+        present = np.flatnonzero(np.isfinite(self.agent_heading[:, agent]))
+        return slice(int(present[0]), int(present[-1]) + 1) if present.size else slice(0, 0)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the episode to a compressed npz file; the file appears whole or not at all.
+
+        Args:
+            path: Target; folders are made.
+
+        Returns:
+            The path written.
+        """
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("policies", "metadata")}
+        header = {"format": FORMAT, "policies": list(self.policies), "metadata": self.metadata}
+        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as file:
+            try:
+                np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
+                file.flush()
+                os.fsync(file.fileno())
+                os.replace(file.name, path)
+            except BaseException:
+                Path(file.name).unlink(missing_ok=True)
+                raise
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Episode":
+        """Read an episode; never runs code from the file.
+
+        Args:
+            path: An npz file written by `save`.
+
+        Returns:
+            The episode, equal to the one saved.
+
+        Raises:
+            FileNotFoundError: If there is no such file.
+            EpisodeError: If the file is damaged or not an episode of this format.
+        """
+        path = Path(path)
+        expected = {f.name for f in fields(cls)} - {"policies", "metadata"}
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                if not hasattr(file, "files") or "header" not in file.files:
+                    raise EpisodeError("it has no header")
+                header = json.loads(str(file["header"]))
+                if header.get("format") != FORMAT:
+                    raise EpisodeError(f"its format is {header.get('format')!r}; this version reads {FORMAT!r}")
+                if missing := expected - set(file.files):
+                    raise EpisodeError(f"it lacks {', '.join(sorted(missing))}")
+                if unknown := set(file.files) - expected - {"header"}:
+                    raise EpisodeError(f"it has unknown arrays {', '.join(sorted(unknown))}")
+                arrays = {name: file[name] for name in expected}
+            return cls(**arrays, policies=tuple(header["policies"]), metadata=header["metadata"])
+        except FileNotFoundError:
+            raise
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            AttributeError,
+            EOFError,
+            zipfile.BadZipFile,
+            zlib.error,
+        ) as error:
+            raise EpisodeError(f"{path} is not a readable episode: {error}") from error
+
+
+_INTEGER_FIELDS = {
+    "agent_person",
+    "agent_outcome",
+    "agent_policy",
+    "pedestrian_person",
+    "contact_agent",
+    "contact_partner_kind",
+    "contact_partner",
+}
+_PER_STEP = {
+    "agent_position",
+    "agent_heading",
+    "agent_velocity",
+    "agent_yaw_rate",
+    "agent_wheel_speed",
+    "agent_policy",
+    "pedestrian_position",
+    "pedestrian_heading",
+    "pedestrian_velocity",
+}
+_PLANAR = {
+    "agent_start",
+    "agent_goal",
+    "agent_position",
+    "agent_velocity",
+    "agent_wheel_speed",
+    "pedestrian_position",
+    "pedestrian_velocity",
+    "contact_position",
+    "contact_normal",
+    "contact_agent_velocity",
+    "contact_partner_velocity",
+}
+
+
+def _expected_shape(name: str, *, t: int, n: int, m: int, k: int) -> tuple[int, ...]:
+    if name == "time":
+        return (t,)
+    shape: tuple[int, ...] = ({"agent": n, "pedestrian": m, "contact": k}[name.split("_")[0]],)
+    if name in _PER_STEP:
+        shape = (t, *shape)
+    return (*shape, 2) if name in _PLANAR else shape

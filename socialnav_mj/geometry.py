@@ -1,0 +1,108 @@
+"""Angles, planar frames, and the map between twists and wheel speeds."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def wrap_angle(angle: ArrayLike) -> Array:
+    """Map angles to [-pi, pi).
+
+    Args:
+        angle: Angles of any shape [rad].
+
+    Returns:
+        The same shape, in [-pi, pi) [rad].
+    """
+    return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def unit_vector(heading: ArrayLike) -> Array:
+    """Unit vectors that point along headings.
+
+    Args:
+        heading: Angles from the x axis, shape (...) [rad].
+
+    Returns:
+        Shape (..., 2).
+    """
+    heading = np.asarray(heading, dtype=float)
+    return np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+
+
+def to_agent_frame(vector: ArrayLike, heading: ArrayLike) -> Array:
+    """Rotate world vectors into a frame whose x axis is the agent's heading.
+
+    Args:
+        vector: World vectors, shape (..., 2).
+        heading: Agent headings, broadcastable to shape (...) [rad].
+
+    Returns:
+        The vectors' components ahead of and to the left of the agent, shape (..., 2).
+    """
+    vector = np.asarray(vector, dtype=float)
+    heading = np.asarray(heading, dtype=float)
+    cos, sin = np.cos(heading), np.sin(heading)
+    x, y = vector[..., 0], vector[..., 1]
+    return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
+
+
+def yaw_of_quaternion(quaternion: ArrayLike) -> Array:
+    """Heading of a body: the angle of its x axis projected on the floor.
+
+    Args:
+        quaternion: MuJoCo quaternions (w, x, y, z), shape (..., 4).
+
+    Returns:
+        Shape (...), in [-pi, pi] [rad].
+    """
+    quaternion = np.asarray(quaternion, dtype=float)
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def quaternion_of_yaw(yaw: ArrayLike) -> Array:
+    """MuJoCo quaternion of a rotation about the vertical.
+
+    Args:
+        yaw: Shape (...) [rad].
+
+    Returns:
+        Quaternions (w, x, y, z), shape (..., 4).
+    """
+    half = 0.5 * np.asarray(yaw, dtype=float)
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def wheel_speed_of_twist(twist: ArrayLike, *, wheel_radius: float, track: float) -> Array:
+    """Wheel speeds of a differential drive that rolls with a twist.
+
+    Args:
+        twist: (forward speed [m/s], yaw rate [rad/s]), shape (..., 2).
+        wheel_radius: [m].
+        track: Distance between the wheels' contact points [m].
+
+    Returns:
+        (left, right) wheel speeds, shape (..., 2) [rad/s].
+    """
+    twist = np.asarray(twist, dtype=float)
+    forward, turn = twist[..., 0], 0.5 * track * twist[..., 1]
+    return np.stack([forward - turn, forward + turn], axis=-1) / wheel_radius
+
+
+def twist_of_wheel_speed(wheel_speed: ArrayLike, *, wheel_radius: float, track: float) -> Array:
+    """Twist of a differential drive whose wheels roll without slip.
+
+    Args:
+        wheel_speed: (left, right), shape (..., 2) [rad/s].
+        wheel_radius: [m].
+        track: Distance between the wheels' contact points [m].
+
+    Returns:
+        (forward speed [m/s], yaw rate [rad/s]), shape (..., 2).
+    """
+    wheel_speed = np.asarray(wheel_speed, dtype=float)
+    left, right = wheel_radius * wheel_speed[..., 0], wheel_radius * wheel_speed[..., 1]
+    return np.stack([0.5 * (left + right), (right - left) / track], axis=-1)

@@ -1,0 +1,91 @@
+"""What a controller sees: poses and velocities in each agent's frame; pure functions.
+
+Keys of an observation, for n slots of agents and m slots of pedestrians:
+
+| key | shape | meaning |
+|---|---|---|
+| active | (n,) bool | the slot holds an agent that is under way; other rows are zero |
+| person | (n,) int64 | id of the person the agent replaces, -1 if inactive; changes when a slot is used again |
+| position | (n, 2) | world [m] |
+| heading | (n,) | world [rad] |
+| twist | (n, 2) | measured forward speed [m/s] and yaw rate [rad/s] |
+| goal | (n, 2) | agent's frame: ahead, left [m] |
+| pedestrian_position | (n, m, 2) | agent's frame, relative [m] |
+| pedestrian_velocity | (n, m, 2) | agent's frame's axes, the pedestrian's own velocity over ground [m/s] |
+| pedestrian_mask | (n, m) bool | the pedestrian is there; other entries are zero |
+| agent_position | (n, n, 2) | as above, for the other agents |
+| agent_velocity | (n, n, 2) | |
+| agent_mask | (n, n) bool | the other agent is there and is not oneself |
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.geometry import Array, to_agent_frame
+
+
+def observe(
+    *,
+    active: NDArray[np.bool_],
+    person: NDArray[np.int64],
+    position: Array,
+    heading: Array,
+    velocity: Array,
+    yaw_rate: Array,
+    goal: Array,
+    pedestrian_position: Array,
+    pedestrian_velocity: Array,
+    pedestrian_present: NDArray[np.bool_],
+) -> dict[str, NDArray]:
+    """Observation of every agent slot.
+
+    Args:
+        active: (n,) which slots hold an agent under way.
+        person: (n,) id of the person replaced.
+        position: (n, 2) world [m].
+        heading: (n,) world [rad].
+        velocity: (n, 2) world [m/s].
+        yaw_rate: (n,) [rad/s].
+        goal: (n, 2) world [m].
+        pedestrian_position: (m, 2) world [m].
+        pedestrian_velocity: (m, 2) world [m/s].
+        pedestrian_present: (m,) which pedestrians are in the scene.
+
+    Returns:
+        The keys, shapes and units of this module's docstring.
+    """
+    n, m = len(active), len(pedestrian_present)
+    rows, columns = np.flatnonzero(active), np.flatnonzero(pedestrian_present)
+    result: dict[str, NDArray] = {
+        "active": active.copy(),
+        "person": np.where(active, person, -1),
+        "position": np.zeros((n, 2)),
+        "heading": np.zeros(n),
+        "twist": np.zeros((n, 2)),
+        "goal": np.zeros((n, 2)),
+        "pedestrian_position": np.zeros((n, m, 2)),
+        "pedestrian_velocity": np.zeros((n, m, 2)),
+        "pedestrian_mask": active[:, None] & pedestrian_present,
+        "agent_position": np.zeros((n, n, 2)),
+        "agent_velocity": np.zeros((n, n, 2)),
+        "agent_mask": active[:, None] & active & ~np.eye(n, dtype=bool),
+    }
+    if not rows.size:
+        return result
+    here, facing, moving = position[rows], heading[rows], velocity[rows]
+    own = to_agent_frame(moving, facing)
+    result["position"][rows] = here
+    result["heading"][rows] = facing
+    result["twist"][rows, 0] = own[:, 0]
+    result["twist"][rows, 1] = yaw_rate[rows]
+    result["goal"][rows] = to_agent_frame(goal[rows] - here, facing)
+    people = np.ix_(rows, columns)
+    result["pedestrian_position"][people] = to_agent_frame(
+        pedestrian_position[columns] - here[:, None], facing[:, None]
+    )
+    result["pedestrian_velocity"][people] = to_agent_frame(pedestrian_velocity[columns][None], facing[:, None])
+    others = np.ix_(rows, rows)
+    seen = ~np.eye(len(rows), dtype=bool)[..., None]
+    result["agent_position"][others] = to_agent_frame(here - here[:, None], facing[:, None]) * seen
+    result["agent_velocity"][others] = to_agent_frame(moving[None], facing[:, None]) * seen
+    return result

@@ -1,0 +1,37 @@
+"""Where the MJCF assets and the embedded data are, in a wheel, an editable install or a bare checkout."""
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def _folder(name: str) -> Path:
+    """The folder inside the package if it exists (wheel), else the one beside the package (checkout)."""
+    for candidate in (_PACKAGE / name, _PACKAGE.parent / name):
+        if candidate.is_dir():
+            return candidate
+    raise FileNotFoundError(f"no folder {name!r} in {_PACKAGE} or {_PACKAGE.parent}; the installation is incomplete")
+
+
+def assets_folder() -> Path:
+    """Folder of the MJCF files and the trained policies.
+
+    Returns:
+        An absolute path.
+
+    Raises:
+        FileNotFoundError: If the installation has none.
+    """
+    return _folder("assets")
+
+
+def data_folder() -> Path:
+    """Folder of the embedded recording and the catalogue.
+
+    Returns:
+        An absolute path.
+
+    Raises:
+        FileNotFoundError: If the installation has none.
+    """
+    return _folder("data")
