@@ -121,7 +121,7 @@ def build_episode(
     last = np.array([a.spawn_step + len(track) - 1 for a, track in zip(agents, tracks, strict=True)], dtype=np.int64)
     ends = [*last[spawned], *(p.first_step + len(w) - 1 for p, w in zip(pedestrians, walks, strict=True))]
     t = n_samples or max((int(end) + 1 for end in ends), default=1)
-    time = start_time + step * np.arange(t)
+    time = start_time + step * np.arange(t, dtype=np.float64)
 
     body = _samples([track if s else None for track, s in zip(tracks, spawned, strict=True)], first, t, step)
     wheel_speed = np.full((t, n, 2), np.nan)
@@ -153,7 +153,7 @@ def build_episode(
         agent_person=np.array(person, dtype=np.int64),
         agent_start=start,
         agent_goal=goal,
-        agent_appear_time=start_time + step * (first - np.array([a.delay_steps for a in agents], dtype=np.int64)),
+        agent_appear_time=start_time + step * (first - np.array([a.delay_steps for a in agents], dtype=float)),
         agent_spawn_time=spawn_time,
         agent_deadline=spawn_time + allowed,
         agent_end_time=np.where(spawned, start_time + step * last, np.nan),
@@ -185,7 +185,7 @@ def _track(positions: ArrayLike) -> Array:
     return np.asarray(positions, dtype=float).reshape(-1, 2)
 
 
-def _samples(tracks: Sequence[Array | None], first: Any, t: int, step: float) -> dict[str, Array]:
+def _samples(tracks: Sequence[Array | None], first: Any, t: int, step: float) -> dict[str, Any]:
     """Position, heading, velocity and yaw rate of tracks laid on the time axis, NaN where there is nobody."""
     n = len(tracks)
     position, velocity = np.full((t, n, 2), np.nan), np.full((t, n, 2), np.nan)

@@ -1,0 +1,76 @@
+"""How near each agent came to replayed pedestrians; distances are between centres."""
+
+import numpy as np
+
+from socialnav_mj.episode import Episode
+from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.navigation import active_steps
+
+INTIMATE_DISTANCE = 1.2
+"""Limit of the paper's "intimate space" [m]. In Hall's proxemics 1.2 m ends *personal* space (intimate: 0.45 m); we
+keep the paper's number and its name."""
+
+
+def nearest_pedestrian_distance(episode: Episode) -> Array:
+    """Distance from each agent to the nearest replayed pedestrian at every sample; other agents do not count.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (t, n_agents); inf where no pedestrian is in the scene, NaN where the agent is not [m].
+    """
+    result = np.full((len(episode.time), episode.n_agents), np.nan)
+    for i in range(episode.n_agents):
+        window = episode.window(i)
+        crowd = episode.pedestrian_position[window]
+        crowd = crowd[:, np.isfinite(crowd[..., 0]).any(axis=0)]
+        gap = crowd - episode.agent_position[window, i, None]
+        squared = np.einsum("tmd,tmd->tm", gap, gap)
+        squared[np.isnan(squared)] = np.inf
+        result[window, i] = np.sqrt(squared.min(axis=1, initial=np.inf))
+    return result
+
+
+def intimate_intrusions(episode: Episode) -> Array:
+    """Intimate intrusions (paper metric 4): active steps with a replayed pedestrian nearer than 1.2 m.
+
+    Strictly nearer: at 1.2 m exactly the space is not violated. A step counts once, however many people are that
+    near. The number depends on the control time step and on how long the agent was under way; `intrusion_share`
+    does not.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,); whole numbers, NaN for agents without an active step.
+    """
+    near = (nearest_pedestrian_distance(episode) < INTIMATE_DISTANCE) & episode.agent_active
+    return np.where(active_steps(episode) > 0.0, near.sum(axis=0), np.nan)
+
+
+def intrusion_share(episode: Episode) -> Array:
+    """Intimate intrusions over the active steps of the same agent.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), in [0, 1]; NaN for agents without an active step.
+    """
+    steps = active_steps(episode)
+    return np.divide(intimate_intrusions(episode), steps, out=np.full_like(steps, np.nan), where=steps > 0.0)
+
+
+def minimum_distance(episode: Episode) -> Array:
+    """Smallest distance to a replayed pedestrian over the active steps.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,); NaN for agents without an active step with a pedestrian in the scene [m].
+    """
+    distance = np.where(episode.agent_active, nearest_pedestrian_distance(episode), np.inf)
+    smallest = distance.min(axis=0, initial=np.inf)
+    return np.where(np.isfinite(smallest), smallest, np.nan)
