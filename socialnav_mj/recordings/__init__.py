@@ -1,0 +1,6 @@
+"""Recorded crowds: file formats, catalogue, interpolation, draws, facts."""
+
+from socialnav_mj.recordings.catalogue import load_recording
+from socialnav_mj.recordings.recording import Crowd, Recording, Track
+
+__all__ = ["Crowd", "Recording", "Track", "load_recording"]

@@ -1,0 +1,176 @@
+"""Known recordings: where they come from, where they are looked for, what they must contain."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import get_args
+
+import pooch
+
+from socialnav_mj.recordings.readers import Variant, read_recording, sha256, source_files
+from socialnav_mj.recordings.recording import Recording
+from socialnav_mj.recordings.ucy import AxisOrder
+from socialnav_mj.resources import data_folder
+
+DATA_VARIABLE = "SOCIALNAV_MJ_DATA"
+"""Environment variable that names a data directory."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CatalogueRow:
+    """What is known of one recording."""
+
+    name: str
+    title: str
+    folder: str
+    """Below a data directory, or below the embedded `data` folder if there is no url."""
+    url: str | None
+    """Of the folder's files; None for an embedded recording."""
+    source: str
+    licence: str
+    frame_rate: float
+    """Of the frame numbers in the files [Hz]."""
+    scale: str
+    """How the files' unit becomes metres, in words."""
+    axis_order: AxisOrder
+    """What the homography of the vsp takes."""
+    variants: Mapping[Variant, Mapping[str, str]]
+    """Per variant: file names with their sha256, in reading order; the first variant is the default."""
+
+
+@cache
+def catalogue() -> Mapping[str, CatalogueRow]:
+    """All known recordings by name, from `data/catalogue.toml`.
+
+    Returns:
+        Rows in the order of the file.
+    """
+    with (data_folder() / "catalogue.toml").open("rb") as file:
+        rows = tomllib.load(file)
+    return {name: CatalogueRow(name=name, **{"url": None, **row}) for name, row in rows.items()}
+
+
+def catalogue_row(name: str) -> CatalogueRow:
+    """The row of a recording.
+
+    Args:
+        name: In the catalogue.
+
+    Returns:
+        The row.
+
+    Raises:
+        ValueError: If there is none; lists what exists.
+    """
+    if name not in catalogue():
+        raise ValueError(f"unknown recording {name!r}; available: {', '.join(catalogue())}, or the path of one")
+    return catalogue()[name]
+
+
+def data_directories(data_dir: str | Path | None = None) -> tuple[Path, ...]:
+    """Where downloaded recordings are looked for, in this order.
+
+    Args:
+        data_dir: Given on the command line, if any.
+
+    Returns:
+        `data_dir`, the directory named by SOCIALNAV_MJ_DATA, and the user's cache, as far as they are set.
+    """
+    given = [data_dir, os.environ.get(DATA_VARIABLE) or None, pooch.os_cache("socialnav-mj")]
+    return tuple(Path(folder).expanduser() for folder in given if folder is not None)
+
+
+def load_recording(
+    name_or_path: str | Path,
+    *,
+    variant: Variant | None = None,
+    data_dir: str | Path | None = None,
+    frame_rate: float | None = None,
+    axis_order: AxisOrder | None = None,
+) -> Recording:
+    """Load a recording by its name in the catalogue or by the path of a file or folder.
+
+    A catalogue name wins over a path of the same spelling (write `./name` for the path). Files found by name are
+    checked against their sha256. Files given by path whose sha256 the catalogue knows take its frame rate and axis
+    order; of others the frame rate is what the file states or 25 Hz, and the axis order is "xy".
+
+    Args:
+        name_or_path: For example `plaza`, `students003` or `recordings/mine.txt`.
+        variant: Which of several annotations; None takes the default (see `source_files` for paths).
+        data_dir: Looked into first.
+        frame_rate: Overrides that of the source [Hz].
+        axis_order: Overrides what the homography of a vsp takes.
+
+    Returns:
+        The recording.
+
+    Raises:
+        ValueError: If the name, the variant or the format is unknown, or a file is not what it should be.
+        FileNotFoundError: If the files are nowhere; says where they were looked for and what helps.
+    """
+    if frame_rate is not None and not frame_rate > 0.0:
+        raise ValueError(f"frame_rate = {frame_rate!r} is not allowed; allowed: numbers > 0")
+    if axis_order is not None and axis_order not in get_args(AxisOrder):
+        raise ValueError(f"axis_order = {axis_order!r} is not allowed; allowed: {', '.join(get_args(AxisOrder))}")
+    row: CatalogueRow | None
+    if str(name_or_path) in catalogue():
+        row = catalogue_row(str(name_or_path))
+        name, kind = row.name, _variant(row, variant)
+        files = _find(row, kind, data_dir)
+        _verify(row, kind, files)
+    else:
+        path = Path(name_or_path).expanduser()
+        if not path.exists():
+            raise FileNotFoundError(
+                f"no recording {str(name_or_path)!r}: it is neither in the catalogue ({', '.join(catalogue())}) "
+                f"nor a file or folder"
+            )
+        kind, files = source_files(path, variant)
+        name = path.resolve().stem
+        row = _known_by_checksum(kind, files)
+    if row is not None:
+        frame_rate = frame_rate or row.frame_rate
+        axis_order = axis_order or row.axis_order
+    return read_recording(files, name=name, variant=kind, frame_rate=frame_rate, axis_order=axis_order or "xy")
+
+
+def _variant(row: CatalogueRow, variant: Variant | None) -> Variant:
+    if variant is None:
+        return next(iter(row.variants))
+    if variant not in row.variants:
+        raise ValueError(f"recording {row.name!r} has no variant {variant!r}; available: {', '.join(row.variants)}")
+    return variant
+
+
+def _find(row: CatalogueRow, variant: Variant, data_dir: str | Path | None) -> tuple[Path, ...]:
+    roots = data_directories(data_dir) if row.url else (data_folder(),)
+    for root in roots:
+        files = tuple(root / row.folder / name for name in row.variants[variant])
+        if all(file.is_file() for file in files):
+            return files
+    wanted = " and ".join(f"{row.folder}/{name}" for name in row.variants[variant])
+    looked = ", ".join(map(str, roots))
+    raise FileNotFoundError(
+        f"recording {row.name!r} is not on this machine: no {wanted} in {looked}. "
+        f"Download it with `socialnav-mj data fetch {row.name}`, or say where it is with "
+        f"`export {DATA_VARIABLE}=DIRECTORY` or --data-dir DIRECTORY"
+    )
+
+
+def _verify(row: CatalogueRow, variant: Variant, files: tuple[Path, ...]) -> None:
+    for file, expected in zip(files, row.variants[variant].values(), strict=True):
+        given = sha256([file])
+        if given != expected:
+            raise ValueError(
+                f"{file}: sha256 {given}; the catalogue expects {expected}. Remove the file and run "
+                f"`socialnav-mj data fetch {row.name}`, or load it by its path to use it as it is"
+            )
+
+
+def _known_by_checksum(variant: Variant, files: tuple[Path, ...]) -> CatalogueRow | None:
+    sums = [sha256([file]) for file in files]
+    rows = (row for row in catalogue().values() if list(row.variants.get(variant, {}).values()) == sums)
+    return next(rows, None)

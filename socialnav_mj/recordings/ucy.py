@@ -1,0 +1,132 @@
+"""Readers of the UCY formats: `annotation.vsp` with `H.txt`, and `obsmat.txt` (Lerner et al. 2007; Pellegrini 2009)."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from socialnav_mj.geometry import Array
+from socialnav_mj.recordings.samples import FormatError, Row, Samples, number, samples_of_rows, text_lines, whole_number
+
+AxisOrder = Literal["xy", "yx"]
+
+
+def read_homography(path: Path) -> Array:
+    """Read the map from image to floor.
+
+    Args:
+        path: Text file of three lines with three numbers each.
+
+    Returns:
+        (3, 3) homography, pixels to metres.
+
+    Raises:
+        FormatError: If the file is something else, or the matrix is singular.
+    """
+    rows = [(i, line.split()) for i, line in enumerate(text_lines(path), 1) if line.strip()]
+    for i, fields in rows:
+        if len(fields) != 3:
+            raise FormatError(path, i, f"{len(fields)} numbers", "3 numbers a line")
+    if len(rows) != 3:
+        raise FormatError(path, None, f"{len(rows)} lines of numbers", "3 lines (a 3x3 homography)")
+    matrix = np.array([[number(text, path, i, "homography") for text in fields] for i, fields in rows])
+    # Scaling by row keeps the test independent of the unit of the pixels.
+    norms = np.linalg.norm(matrix, axis=1)
+    if not norms.all() or abs(np.linalg.det(matrix / norms[:, None])) < 1e-9:
+        raise FormatError(path, None, "a singular matrix", "an invertible homography")
+    return matrix
+
+
+def apply_homography(matrix: Array, pixels: Array, axis_order: AxisOrder) -> Array:
+    """Map image points to the floor.
+
+    Args:
+        matrix: (3, 3) homography.
+        pixels: (k, 2) x to the right and y up from the image centre.
+        axis_order: Whether the homography takes (x, y) or (y, x).
+
+    Returns:
+        (k, 2) [m].
+    """
+    ordered = pixels if axis_order == "xy" else pixels[:, ::-1]
+    mapped = np.column_stack([ordered, np.ones(len(ordered))]) @ matrix.T
+    return mapped[:, :2] / mapped[:, 2:]
+
+
+def read_vsp(path: Path, homography: Path, *, axis_order: AxisOrder = "xy") -> Samples:
+    """Read splines of hand-set control points.
+
+    The first line counts the splines; each spline is a line with its count of control points and then one line
+    `x y frame gaze` per point, in pixels from the image centre (x right, y up). Text after the numbers is a remark;
+    what follows the last spline (obstacles, groups) is not read. A person's id is its spline's place in the file,
+    counted from 1.
+
+    Args:
+        path: The `.vsp` file.
+        homography: The file of the map from pixels to metres.
+        axis_order: Whether that map takes (x, y) or (y, x).
+
+    Returns:
+        The control points.
+
+    Raises:
+        FormatError: At the first mistake in either file.
+    """
+    matrix = read_homography(homography)
+    lines = text_lines(path)
+
+    def fields(index: int, count: int, expected: str) -> list[str]:
+        if index >= len(lines):
+            raise FormatError(path, len(lines), "the file ends here", expected)
+        found = lines[index].split()[:count]
+        if len(found) < count:
+            raise FormatError(path, index + 1, repr(lines[index]), expected)
+        return found
+
+    def a_count(index: int, what: str) -> int:
+        value = whole_number(fields(index, 1, what)[0], path, index + 1, what)
+        if value < 0:
+            raise FormatError(path, index + 1, f"{what} is {value}", "0 or more")
+        return value
+
+    n_splines = a_count(0, "the number of splines")
+    rows: list[Row] = []
+    index = 1
+    for person in range(1, n_splines + 1):
+        n_points = a_count(index, f"the number of control points of spline {person} of {n_splines}")
+        for point in range(1, n_points + 1):
+            i = index + point
+            x, y, frame, gaze = fields(i, 4, f"x y frame gaze of point {point} of {n_points} of spline {person}")
+            number(gaze, path, i + 1, "gaze")
+            at = whole_number(frame, path, i + 1, "frame")
+            if point > 1 and at <= rows[-1][1]:
+                raise FormatError(path, i + 1, f"frame {at} after frame {rows[-1][1]}", "frames that increase")
+            rows.append((i + 1, at, person, number(x, path, i + 1, "x"), number(y, path, i + 1, "y")))
+        index += n_points + 1
+    samples = samples_of_rows(path, rows)
+    position = apply_homography(matrix, samples.position, axis_order)
+    return Samples(path=path, line=samples.line, frame=samples.frame, person=samples.person, position=position)
+
+
+def read_obsmat(path: Path) -> Samples:
+    """Read rows of eight numbers: frame, id, x, z, y, vx, vz, vy, in metres; only frame, id, x, y are used.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The rows.
+
+    Raises:
+        FormatError: At the first mistake.
+    """
+    rows: list[Row] = []
+    for i, line in enumerate(text_lines(path), 1):
+        values = line.split()
+        if not values:
+            continue
+        if len(values) != 8:
+            raise FormatError(path, i, f"{len(values)} numbers", "8: frame id x z y vx vz vy")
+        frame, person = whole_number(values[0], path, i, "frame"), whole_number(values[1], path, i, "id")
+        rows.append((i, frame, person, number(values[2], path, i, "x"), number(values[4], path, i, "y")))
+    return samples_of_rows(path, rows)
