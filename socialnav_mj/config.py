@@ -63,6 +63,8 @@ class Scenario:
     """People whose end is nearer to their start than this are never replaced [m]."""
     spawn_clearance: float = 0.05
     """Free gap to every body that a spawning agent needs [m]."""
+    contact_rearm_time: float = 0.2
+    """Two bodies must have been apart this long before their next touch counts as a new collision [s]."""
 
     def __post_init__(self) -> None:
         _require(0.0 < self.share <= 1.0, "share", self.share, "numbers in (0, 1]")
@@ -81,7 +83,7 @@ class Scenario:
         )
         for name in ("pedestrian_radius", "control_timestep", "physics_timestep", "goal_radius"):
             _require(getattr(self, name) > 0.0, name, getattr(self, name), "numbers > 0")
-        for name in ("deadline_base", "deadline_per_metre", "minimum_displacement", "spawn_clearance"):
+        for name in ("deadline_base", "deadline_per_metre", "minimum_displacement", "spawn_clearance", "contact_rearm_time"):
             _require(getattr(self, name) >= 0.0, name, getattr(self, name), "numbers >= 0")
         _require(
             abs(self.control_timestep / self.physics_timestep - self.n_sub_steps) < 1e-6,

@@ -1,0 +1,91 @@
+"""The four scenarios of the paper as a dm_control domain.
+
+`tasks.load("scenario_1")` returns an environment; after `tasks.register_with_dm_control()` so does
+`dm_control.suite.load("socialnav", "scenario_1")`. All keyword arguments of
+`socialnav_mj.task.make_environment` can be given in `task_kwargs`.
+"""
+
+import inspect
+from typing import Any
+
+from dm_control.rl import control
+
+# dm_control.utils.containers cannot be the first import of dm_control.
+from dm_control.utils import containers
+
+from socialnav_mj.task import make_environment
+
+DOMAIN = "socialnav"
+SUITE = containers.TaggedTasks()
+
+
+@SUITE.add("benchmarking", "no_reward_visualization")
+def scenario_1(**task_kwargs: Any) -> control.Environment:
+    """10 % of the people are replaced by robots, a few robots in a crowd of people (paper section IV)."""
+    return make_environment(**{"share": 0.1, **task_kwargs})
+
+
+@SUITE.add("benchmarking", "no_reward_visualization")
+def scenario_2(**task_kwargs: Any) -> control.Environment:
+    """30 % of the people are replaced by robots (paper section IV)."""
+    return make_environment(**{"share": 0.3, **task_kwargs})
+
+
+@SUITE.add("benchmarking", "no_reward_visualization")
+def scenario_3(**task_kwargs: Any) -> control.Environment:
+    """70 % of the people are replaced by robots (paper section IV)."""
+    return make_environment(**{"share": 0.7, **task_kwargs})
+
+
+@SUITE.add("benchmarking", "no_reward_visualization")
+def scenario_4(**task_kwargs: Any) -> control.Environment:
+    """90 % of the people are replaced by robots, many robots among a few people (paper section IV)."""
+    return make_environment(**{"share": 0.9, **task_kwargs})
+
+
+ALL_TASKS: tuple[str, ...] = tuple(SUITE)
+
+
+def load(
+    task_name: str,
+    task_kwargs: dict[str, Any] | None = None,
+    environment_kwargs: dict[str, Any] | None = None,
+    visualize_reward: bool = False,
+) -> control.Environment:
+    """Environment of a scenario.
+
+    Args:
+        task_name: One of `ALL_TASKS`.
+        task_kwargs: Keyword arguments of `socialnav_mj.task.make_environment`.
+        environment_kwargs: Keyword arguments of `dm_control.rl.control.Environment`.
+        visualize_reward: As in `dm_control.suite.load`; these tasks colour nothing by reward.
+
+    Returns:
+        A dm_control environment.
+
+    Raises:
+        ValueError: If the task or a keyword is unknown, or a value not allowed.
+    """
+    if task_name not in SUITE:
+        raise ValueError(f"unknown task {task_name!r}; available: {', '.join(ALL_TASKS)}")
+    allowed = inspect.signature(make_environment).parameters
+    if unknown := sorted(set(task_kwargs or {}) - set(allowed)):
+        raise ValueError(f"unknown task_kwargs {', '.join(unknown)}; available: {', '.join(allowed)}")
+    environment = SUITE[task_name](**(task_kwargs or {}), environment_kwargs=environment_kwargs)
+    environment.task.visualize_reward = visualize_reward
+    return environment
+
+
+def register_with_dm_control() -> None:
+    """Make `dm_control.suite.load("socialnav", ...)` find these tasks."""
+    import sys
+
+    from dm_control import suite
+
+    domain = sys.modules[__name__]
+    suite._DOMAINS[DOMAIN] = domain
+    suite.TASKS_BY_DOMAIN[DOMAIN] = ALL_TASKS
+    missing = tuple((DOMAIN, name) for name in ALL_TASKS if (DOMAIN, name) not in suite.ALL_TASKS)
+    suite.ALL_TASKS += missing
+    suite.BENCHMARKING += missing
+    suite.NO_REWARD_VIZ += missing

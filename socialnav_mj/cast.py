@@ -1,0 +1,214 @@
+"""Who is replaced and who is replayed, on the grid of control steps and with a slot for everybody."""
+
+from dataclasses import dataclass, fields
+from heapq import heappop, heappush
+
+import numpy as np
+
+from socialnav_mj.config import Scenario
+from socialnav_mj.episode import IntArray
+from socialnav_mj.geometry import Array
+from socialnav_mj.recordings import Recording
+from socialnav_mj.recordings.draw import replaced_people
+
+NOBODY = -1
+"""Index that stands for an empty slot."""
+
+_GRID_TOLERANCE = 1e-6
+"""Times this near a control step, as a share of it, are on it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cast:
+    """The people of a recording, split by a draw into n agents and m pedestrians.
+
+    Steps count control steps from the recording's first frame. A person is in the scene from the first step at or
+    after its appearance to the last step at or before its disappearance.
+    """
+
+    agent_index: IntArray
+    """(n,) index into the recording, ascending."""
+    agent_person: IntArray
+    """(n,) id."""
+    agent_start: Array
+    """(n, 2) [m]."""
+    agent_goal: Array
+    """(n, 2) [m]."""
+    agent_heading: Array
+    """(n,) recorded heading at the start [rad]."""
+    agent_appear_step: IntArray
+    """(n,)"""
+    agent_allowed_steps: IntArray
+    """(n,) from the real spawn to the deadline."""
+    n_agent_slots: int
+    """Agents that can be in the scene at once."""
+    pedestrian_index: IntArray
+    """(m,) index into the recording, ascending."""
+    pedestrian_person: IntArray
+    """(m,) id."""
+    pedestrian_first_step: IntArray
+    """(m,)"""
+    pedestrian_last_step: IntArray
+    """(m,) included."""
+    pedestrian_slot: IntArray
+    """(m,) fixed for the episode."""
+    n_pedestrian_slots: int
+    """Pedestrians that can be in the scene at once; at least 1."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    @property
+    def n_agents(self) -> int:
+        """Number of agents."""
+        return len(self.agent_index)
+
+    @property
+    def n_pedestrians(self) -> int:
+        """Number of replayed people."""
+        return len(self.pedestrian_index)
+
+
+def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
+    """Split a recording's people by the scenario's draw.
+
+    Args:
+        recording: The crowd.
+        scenario: Gives share, seed, time step and deadlines.
+
+    Returns:
+        The cast. People who are not there at any control step are neither agents nor pedestrians.
+
+    Raises:
+        ValueError: If the draw has no agents.
+    """
+    dt = scenario.control_timestep
+    first = np.ceil(recording.start_time / dt - _GRID_TOLERANCE).astype(np.int64)
+    last = np.floor(recording.end_time / dt + _GRID_TOLERANCE).astype(np.int64)
+    agents = replaced_people(
+        recording, share=scenario.share, seed=scenario.seed, minimum_displacement=scenario.minimum_displacement
+    )
+    if not len(agents):
+        raise ValueError(
+            f"share = {scenario.share} of the {recording.n_people} people of recording {recording.name!r} leaves no "
+            f"agent; allowed: shares that replace at least one person who moves {scenario.minimum_displacement} m"
+        )
+    pedestrians = np.setdiff1d(np.flatnonzero(last >= first), agents)
+    start, goal = recording.start[agents], recording.end[agents]
+    distance = np.linalg.norm(goal - start, axis=1)
+    allowed = np.array([scenario.allowed_steps(d) for d in distance], dtype=np.int64)
+    heading = np.array([recording.person(i).at(recording.start_time[i : i + 1])[2][0] for i in agents])
+    _, n_agent_slots = _slots(first[agents], first[agents] + allowed)
+    slot, n_slots = _slots(first[pedestrians], last[pedestrians])
+    return Cast(
+        agent_index=agents,
+        agent_person=recording.ids[agents],
+        agent_start=start,
+        agent_goal=goal,
+        agent_heading=heading,
+        agent_appear_step=first[agents],
+        agent_allowed_steps=allowed,
+        n_agent_slots=n_agent_slots,
+        pedestrian_index=pedestrians,
+        pedestrian_person=recording.ids[pedestrians],
+        pedestrian_first_step=first[pedestrians],
+        pedestrian_last_step=last[pedestrians],
+        pedestrian_slot=slot,
+        n_pedestrian_slots=max(1, n_slots),
+    )
+
+
+def _slots(first: IntArray, last: IntArray) -> tuple[IntArray, int]:
+    """Smallest set of slots such that no two intervals [first, last] of one slot overlap (greedy colouring)."""
+    slot = np.zeros(len(first), dtype=np.int64)
+    free: list[int] = []
+    busy: list[tuple[int, int]] = []
+    count = 0
+    for i in np.argsort(first, kind="stable"):
+        while busy and busy[0][0] < first[i]:
+            heappush(free, heappop(busy)[1])
+        if not free:
+            heappush(free, count)
+            count += 1
+        slot[i] = heappop(free)
+        heappush(busy, (int(last[i]), int(slot[i])))
+    return slot, count
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlotCrowd:
+    """The people in the pedestrian slots at one control step; NaN in empty slots."""
+
+    pedestrian: IntArray
+    """(n_slots,) index of the pedestrian, -1 for nobody."""
+    position: Array
+    """(n_slots, 2) [m]."""
+    velocity: Array
+    """(n_slots, 2) [m/s]."""
+    heading: Array
+    """(n_slots,) [rad]."""
+
+
+class Replay:
+    """How the pedestrians of a cast move, evaluated once at every physics step.
+
+    Who is in the scene at a control step stays until the next: a person whose track ends in between waits at its end.
+    """
+
+    def __init__(self, recording: Recording, scenario: Scenario, cast: Cast) -> None:
+        """Evaluate the tracks.
+
+        Args:
+            recording: The crowd.
+            scenario: Gives the time steps.
+            cast: Says who is replayed, in which slot.
+        """
+        self._count = count = scenario.n_sub_steps
+        slots = cast.n_pedestrian_slots
+        self._steps = steps = int(cast.pedestrian_last_step.max(initial=-1)) + 1
+        # One row more than there are control steps: an empty scene, for all the time after.
+        self._pedestrian = np.full((steps + 1, slots), NOBODY, dtype=np.int64)
+        self._position = np.full(((steps + 1) * count, slots, 2), np.nan)
+        self._velocity = np.full_like(self._position, np.nan)
+        self._heading = np.full((steps + 1, slots), np.nan)
+        for i, slot in enumerate(cast.pedestrian_slot):
+            first, end = int(cast.pedestrian_first_step[i]), int(cast.pedestrian_last_step[i]) + 1
+            fine = slice(first * count, end * count)
+            times = np.arange(fine.start, fine.stop) * scenario.physics_timestep
+            position, velocity, heading = recording.person(int(cast.pedestrian_index[i])).at(times)
+            self._pedestrian[first:end, slot] = i
+            self._position[fine, slot], self._velocity[fine, slot] = position, velocity
+            self._heading[first:end, slot] = heading[::count]
+
+    def crowd(self, step: int) -> SlotCrowd:
+        """Everybody in the scene at a control step.
+
+        Args:
+            step: >= 0; there is nobody after the recording's end.
+
+        Returns:
+            Views that must not be written to.
+        """
+        step = min(step, self._steps)
+        return SlotCrowd(
+            pedestrian=self._pedestrian[step],
+            position=self._position[step * self._count],
+            velocity=self._velocity[step * self._count],
+            heading=self._heading[step],
+        )
+
+    def motion(self, step: int) -> tuple[Array, Array]:
+        """Positions and velocities at the beginning of every physics step of a control step.
+
+        Args:
+            step: >= 0.
+
+        Returns:
+            Position [m] and velocity [m/s], both of shape (n_sub_steps, n_slots, 2).
+        """
+        step = min(step, self._steps)
+        rows = slice(step * self._count, (step + 1) * self._count)
+        return self._position[rows], self._velocity[rows]

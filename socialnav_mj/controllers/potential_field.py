@@ -1,0 +1,142 @@
+"""Potential field (paper section III-B; Khatib 1986, doi 10.1177/027836498600500106)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.controllers.base import Observation, TwistController
+from socialnav_mj.geometry import Array
+
+MINIMUM_DISTANCE = 0.05
+"""Distances below this repel like this one, which keeps the force finite [m]."""
+MINIMUM_TURN = 1e-3
+"""Least turn that eq 7 divides by, as a share of pi; below pi times this the speed is at its limit anyway."""
+
+
+def attractive_force(goal: Array, velocity: Array, *, position_gain: float, velocity_gain: float) -> Array:
+    """Pull towards the goal, damped (paper eq 3: -k_p (x - x_goal) - k_v dx/dt).
+
+    The second x of the printed equation is the velocity, as the text below it says.
+
+    Args:
+        goal: From the agent to its goal, shape (n_agents, 2) [m].
+        velocity: The agent's own, in the same frame, shape (n_agents, 2) [m/s].
+        position_gain: k_p.
+        velocity_gain: k_v.
+
+    Returns:
+        Shape (n_agents, 2).
+    """
+    return position_gain * goal - velocity_gain * velocity
+
+
+def repulsive_force(obstacle: Array, present: NDArray[np.bool_], *, gain: float, influence_distance: float) -> Array:
+    """Sum of the pushes of all obstacles (paper eqs 4-5: eta/2 (1/rho - 1/rho_0) / rho^2 along d rho/dx).
+
+    d rho/dx is the unit vector from the obstacle to the agent. rho is taken between centres: the paper gives its
+    agents no size. An obstacle at the agent's very centre pushes nowhere.
+
+    Args:
+        obstacle: From the agent to each obstacle, shape (n_agents, n_obstacles, 2) [m].
+        present: Which obstacles are there, shape (n_agents, n_obstacles).
+        gain: eta, >= 0.
+        influence_distance: rho_0 > 0; obstacles farther away push nothing [m].
+
+    Returns:
+        Shape (n_agents, 2), away from the obstacles.
+    """
+    distance = np.linalg.norm(obstacle, axis=-1)
+    rho = np.maximum(distance, MINIMUM_DISTANCE)
+    size = 0.5 * gain * (1.0 / rho - 1.0 / influence_distance) / rho**2
+    size = np.where(present & (distance <= influence_distance), size, 0.0)
+    away = -obstacle / np.maximum(distance, 1e-9)[..., None]
+    return np.einsum("nm,nmd->nd", size, away)
+
+
+def speed_and_turn(force: Array) -> tuple[Array, Array]:
+    """Map a force in the agent's frame to a desired speed and change of heading (paper eqs 7-8).
+
+    The printed eq 7 projects the force on the unit velocity and divides by the signed angle over pi. The velocity is 0
+    at the start, so the heading stands for its direction; the angle can be negative or 0, so we take its absolute
+    value and keep it from 0; a force from behind gives a negative speed, which the robot cannot drive: it turns on the
+    spot.
+
+    Args:
+        force: Shape (n_agents, 2), ahead and to the left.
+
+    Returns:
+        Speed s_f >= 0, not yet limited, and change of heading theta_fx in [-pi, pi] [rad], both of shape (n_agents,).
+    """
+    turn = np.arctan2(force[:, 1], force[:, 0])
+    speed = np.maximum(force[:, 0], 0.0) / np.maximum(np.abs(turn) / np.pi, MINIMUM_TURN)
+    return speed, turn
+
+
+@dataclass(kw_only=True)
+class PotentialField(TwistController):
+    """Attraction to the goal and repulsion from everybody near, pedestrians and agents alike.
+
+    The paper names no gains. With eq 3 as printed the attraction grows with the distance to the goal, 10 N at 10 m, and
+    swamps the repulsion; capped at 1 it is clearly better, so that is the default, and `attraction_limit=None` gives
+    the equations as printed. The paper names no unit of time for the change of heading: it is made in one control step
+    as far as the yaw rate allows.
+    """
+
+    position_gain: float = 1.0
+    """k_p."""
+    velocity_gain: float = 0.5
+    """k_v."""
+    repulsion_gain: float = 2.0
+    """eta."""
+    influence_distance: float = 2.0
+    """rho_0 [m]."""
+    attraction_limit: float | None = 1.0
+    """Largest size of the attractive force; None for eq 3 as printed."""
+    name: str = "potential_field"
+
+    def __post_init__(self) -> None:
+        if not self.influence_distance > 0.0:
+            raise ValueError(f"influence_distance = {self.influence_distance} is not allowed; allowed: numbers > 0")
+        if not self.repulsion_gain >= 0.0:
+            raise ValueError(f"repulsion_gain = {self.repulsion_gain} is not allowed; allowed: numbers >= 0")
+        if self.attraction_limit is not None and not self.attraction_limit > 0.0:
+            raise ValueError(f"attraction_limit = {self.attraction_limit} is not allowed; allowed: numbers > 0, None")
+
+    def force(self, observation: Observation) -> Array:
+        """Total force in the agent's frame (paper eq 6).
+
+        Args:
+            observation: See `socialnav_mj.observation`.
+
+        Returns:
+            Shape (n_agents, 2).
+        """
+        velocity = np.zeros_like(observation["goal"])
+        velocity[:, 0] = observation["twist"][:, 0]
+        attraction = attractive_force(
+            observation["goal"], velocity, position_gain=self.position_gain, velocity_gain=self.velocity_gain
+        )
+        if self.attraction_limit is not None:
+            size = np.linalg.norm(attraction, axis=1, keepdims=True)
+            attraction = attraction * np.minimum(1.0, self.attraction_limit / np.maximum(size, 1e-9))
+        for kind in ("pedestrian", "agent"):
+            attraction = attraction + repulsive_force(
+                observation[f"{kind}_position"],
+                observation[f"{kind}_mask"],
+                gain=self.repulsion_gain,
+                influence_distance=self.influence_distance,
+            )
+        return attraction
+
+    def twist(self, observation: Observation) -> Array:
+        """Speed and yaw rate along the total force.
+
+        Args:
+            observation: See `socialnav_mj.observation`.
+
+        Returns:
+            Shape (n_agents, 2) [m/s], [rad/s].
+        """
+        speed, turn = speed_and_turn(self.force(observation))
+        return np.stack([speed, turn / self.limits.control_timestep], axis=1)

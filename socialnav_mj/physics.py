@@ -1,0 +1,367 @@
+"""What is true in the scene: poses, velocities and contacts of robots and people."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from dm_control.mujoco import Physics as MujocoPhysics
+from dm_control.mujoco.wrapper import MjData, MjModel
+from dm_control.rl.control import PhysicsError
+from numpy.typing import NDArray
+
+from socialnav_mj.episode import IntArray, Partner
+from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
+from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, agent_name, pedestrian_name
+
+_PARKING_DEPTH = 20.0
+"""How far below the floor bodies wait that are not in the scene [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class Touch:
+    """A contact between an agent and another body, from its first to its last physics step."""
+
+    agent: int
+    """Slot of the agent; of two agents the lower."""
+    kind: Partner
+    """What it touched."""
+    partner: int
+    """Slot of the other agent or of the pedestrian."""
+    time: float
+    """First physics step [s]."""
+    last_time: float
+    """Last physics step that was seen so far [s]."""
+    position: Array
+    """(2,) at first touch [m]."""
+    normal: Array
+    """(2,) unit vector from the agent to its partner at first touch."""
+    agent_heading: float
+    """At first touch [rad]."""
+    partner_heading: float
+    """At first touch [rad]."""
+    agent_velocity: Array
+    """(2,) just before [m/s]."""
+    partner_velocity: Array
+    """(2,) just before; a pedestrian's is the recorded one, not the mocap body's, which the solver takes as 0 [m/s]."""
+    impulse: float = 0.0
+    """Integral of the normal force so far [N s]."""
+    peak_force: float = 0.0
+    """Largest normal force so far [N]."""
+
+
+class Physics(MujocoPhysics):
+    """A crowd of robots and mocap pedestrians.
+
+    Every body is in a slot, and a slot is either in use or parked below the floor, out of contact. Mocap poses are
+    written and contacts read at every physics step. All getters return arrays that the caller owns, one row a slot.
+    """
+
+    rearm_time: float = 0.2
+    """Two bodies must have been apart this long before their next touch counts as new [s]."""
+
+    @classmethod
+    def from_mujoco(cls, model: mujoco.MjModel, *, rearm_time: float) -> "Physics":
+        """Physics of a model of `scene.build_model`.
+
+        Args:
+            model: The compiled scene.
+            rearm_time: Time apart after which a touch counts as new [s].
+
+        Returns:
+            The physics with every slot parked.
+        """
+        physics = cls(MjData(MjModel(model)))
+        physics.rearm_time = rearm_time
+        return physics
+
+    def _reload_from_data(self, data: MjData) -> None:
+        model = data.model.ptr
+        names = [model.body(i).name for i in range(model.nbody)]
+        self.n_agents = sum(name.startswith(AGENT_PREFIX) and name.endswith("/robot") for name in names)
+        self.n_pedestrians = sum(name.startswith(PEDESTRIAN_PREFIX) and name.endswith("/pedestrian") for name in names)
+        joints = [model.joint(agent_name(i) + "root") for i in range(self.n_agents)]
+        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.int64)
+        self._qvel = np.array([joint.dofadr[0] for joint in joints], dtype=np.int64)
+        self._ctrl = np.array(
+            [[model.actuator(agent_name(i) + a).id for a in ("forward", "yaw")] for i in range(self.n_agents)]
+        )
+        root = np.asarray(model.body_rootid)
+        robots = np.array([model.body(agent_name(i) + "robot").id for i in range(self.n_agents)])
+        people = np.array([model.body(pedestrian_name(i) + "pedestrian").id for i in range(self.n_pedestrians)])
+        self._mocap = np.asarray(model.body_mocapid)[people]
+        self._agent_bodies = [np.flatnonzero(root == body) for body in robots]
+        self._agent_geoms = [np.flatnonzero(root[model.geom_bodyid] == body) for body in robots]
+        self._agent_dofs = [np.flatnonzero(root[model.dof_bodyid] == body) for body in robots]
+        self._agent_joints = [np.flatnonzero(root[model.jnt_bodyid] == body) for body in robots]
+        self._pedestrian_geom = np.array([model.geom(pedestrian_name(i) + "body").id for i in range(self.n_pedestrians)])
+        self._bits = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
+        self._owner = np.full(model.ngeom, -1, dtype=np.int64)
+        for slot in range(self.n_agents):
+            self._owner[model.geom(agent_name(slot) + "bumper").id] = slot
+        self._owner[self._pedestrian_geom] = self.n_agents + np.arange(self.n_pedestrians)
+        self._velocity_before = np.zeros(model.nv)
+        self._path: Array | None = None
+        self._path_velocity: Array | None = None
+        self._forget_touches()
+        super()._reload_from_data(data)
+
+    def reset(self, keyframe_id: int | None = None) -> None:
+        """Park every slot and forget every contact.
+
+        Args:
+            keyframe_id: See dm_control.
+        """
+        super().reset(keyframe_id)
+        self._forget_touches()
+        self._path = self._path_velocity = None
+        for slot in range(self.n_agents):
+            self.park_agent(slot)
+        everybody = np.arange(self.n_pedestrians)
+        self.set_pedestrian_contacts(everybody, np.zeros(self.n_pedestrians, dtype=bool))
+        self.set_pedestrian_pose(np.full((self.n_pedestrians, 2), np.nan), np.zeros(self.n_pedestrians))
+
+    def _forget_touches(self) -> None:
+        self._touches: dict[tuple[int, int], Touch] = {}
+        self._new_touches: list[Touch] = []
+        self._force = np.zeros(6)
+
+    # Robots
+
+    def agent_position(self) -> Array:
+        """Floor point under the axle's centre.
+
+        Returns:
+            Shape (n_agents, 2) [m].
+        """
+        return self.data.qpos[self._qpos[:, None] + (0, 1)]
+
+    def agent_heading(self) -> Array:
+        """Direction the robots face.
+
+        Returns:
+            Shape (n_agents,) [rad].
+        """
+        return yaw_of_quaternion(self._agent_quaternion())
+
+    def agent_velocity(self) -> Array:
+        """Velocity over ground.
+
+        Returns:
+            Shape (n_agents, 2) [m/s].
+        """
+        return self.data.qvel[self._qvel[:, None] + (0, 1)]
+
+    def agent_yaw_rate(self) -> Array:
+        """Angular velocity about the robots' own upward axis.
+
+        Returns:
+            Shape (n_agents,) [rad/s].
+        """
+        return self.data.qvel[self._qvel + 5]
+
+    def agent_tilt(self) -> Array:
+        """Angle between the robots' upward axis and the vertical.
+
+        Returns:
+            Shape (n_agents,) [rad].
+        """
+        _, x, y, _ = self._agent_quaternion().T
+        return np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
+
+    def _agent_quaternion(self) -> Array:
+        return self.data.qpos[self._qpos[:, None] + (3, 4, 5, 6)]
+
+    def set_twist(self, twist: Array) -> None:
+        """Command the tendon actuators; MuJoCo clips to their ctrlrange.
+
+        Args:
+            twist: (forward speed [m/s], yaw rate [rad/s]), shape (n_agents, 2).
+        """
+        self.data.ctrl[self._ctrl] = twist
+
+    def place_agent(self, slot: int, position: Array, heading: float) -> None:
+        """Put a robot at rest on the floor and into contact with the world.
+
+        Args:
+            slot: Agent slot.
+            position: Shape (2,) [m].
+            heading: [rad].
+        """
+        self._set_agent_state(slot, (*position, 0.0), heading, present=True)
+
+    def park_agent(self, slot: int) -> None:
+        """Take a robot out of the scene and end its touches.
+
+        Args:
+            slot: Agent slot.
+        """
+        self._set_agent_state(slot, (2.0 * slot, 0.0, -_PARKING_DEPTH), 0.0, present=False)
+        self._touches = {
+            key: touch
+            for key, touch in self._touches.items()
+            if touch.agent != slot and (touch.kind != Partner.AGENT or touch.partner != slot)
+        }
+
+    def _set_agent_state(self, slot: int, position: tuple[float, ...], heading: float, *, present: bool) -> None:
+        model, data = self.model, self.data
+        address = self._qpos[slot]
+        data.qpos[model.jnt_qposadr[self._agent_joints[slot]]] = 0.0
+        data.qpos[address : address + 3] = position
+        data.qpos[address + 3 : address + 7] = quaternion_of_yaw(heading)
+        data.qvel[self._agent_dofs[slot]] = 0.0
+        data.qacc_warmstart[self._agent_dofs[slot]] = 0.0
+        data.ctrl[self._ctrl[slot]] = 0.0
+        model.body_gravcomp[self._agent_bodies[slot]] = 0.0 if present else 1.0
+        self._set_contacts(self._agent_geoms[slot], present)
+
+    # Pedestrians
+
+    def set_pedestrian_pose(self, position: Array, heading: Array) -> None:
+        """Move people at once; those whose position is NaN are put below the floor.
+
+        Args:
+            position: Shape (n_pedestrians, 2) [m].
+            heading: Shape (n_pedestrians,) [rad].
+        """
+        absent = np.isnan(position[:, 0])
+        parked = np.stack([2.0 * np.arange(self.n_pedestrians), np.full(self.n_pedestrians, 2.0)], axis=1)
+        self.data.mocap_pos[self._mocap, :2] = np.where(absent[:, None], parked, position)
+        self.data.mocap_pos[self._mocap, 2] = np.where(absent, -_PARKING_DEPTH, 0.0)
+        self.data.mocap_quat[self._mocap] = quaternion_of_yaw(np.where(absent, 0.0, heading))
+
+    def set_pedestrian_path(self, position: Array, velocity: Array) -> None:
+        """Say how people move during the next call of `step`.
+
+        Args:
+            position: At the beginning of each physics step, shape (n_sub_steps, n_pedestrians, 2), NaN for those who
+                are not in the scene [m].
+            velocity: Recorded velocity at the same times and of the same shape [m/s].
+        """
+        self._path, self._path_velocity = position, velocity
+
+    def set_pedestrian_contacts(self, slots: IntArray, enabled: NDArray[np.bool_]) -> None:
+        """Let people touch robots, or pass through them.
+
+        Args:
+            slots: Pedestrian slots, shape (k,).
+            enabled: Shape (k,).
+        """
+        for slot, present in zip(slots, enabled, strict=True):
+            self._set_contacts(self._pedestrian_geom[slot : slot + 1], bool(present))
+            if not present:
+                owner = self.n_agents + int(slot)
+                self._touches = {key: touch for key, touch in self._touches.items() if key[1] != owner}
+
+    def _set_contacts(self, geoms: IntArray, enabled: bool) -> None:
+        bits = self._bits[geoms] if enabled else np.zeros((len(geoms), 2), dtype=self._bits.dtype)
+        self.model.geom_contype[geoms] = bits[:, 0]
+        self.model.geom_conaffinity[geoms] = bits[:, 1]
+
+    # Time
+
+    def step(self, nstep: int = 1) -> None:
+        """Advance by physics steps, moving people before and reading contacts after each.
+
+        Args:
+            nstep: Number of physics steps.
+
+        Raises:
+            PhysicsError: If the state became invalid; names the time and the robot.
+        """
+        model, data = self.model.ptr, self.data.ptr
+        qvel, before, mocap_pos, owner = data.qvel, self._velocity_before, data.mocap_pos, self._owner
+        rows = self._present_rows(nstep)
+        path, velocity, mocap = self._path, self._path_velocity, None
+        if path is not None:
+            mocap, path = self._mocap[rows], path[:, rows]
+        try:
+            with self.check_invalid_state():
+                for k in range(nstep):
+                    if path is not None:
+                        mocap_pos[mocap, :2] = path[k]
+                    np.copyto(before, qvel)
+                    time = data.time
+                    mujoco.mj_step(model, data)
+                    pairs = owner[data.contact.geom]
+                    touching = np.flatnonzero(pairs.min(axis=1) >= 0) if len(pairs) else ()
+                    if len(touching):
+                        self._note_touches(time, pairs, touching, None if velocity is None else velocity[k])
+        except PhysicsError as error:
+            raise PhysicsError(f"at {data.time:.2f} s: {error}{self._culprit()}") from error
+        self._path = self._path_velocity = None
+
+    def refresh_poses(self) -> None:
+        """Bring the poses of bodies, geoms and cameras up to date, which `step` leaves one physics step behind."""
+        mujoco.mj_kinematics(self.model.ptr, self.data.ptr)
+        mujoco.mj_camlight(self.model.ptr, self.data.ptr)
+
+    def _present_rows(self, nstep: int) -> IntArray:
+        if self._path is None:
+            return np.zeros(0, dtype=np.int64)
+        if len(self._path) != nstep:
+            raise ValueError(f"the pedestrians' path has {len(self._path)} positions for {nstep} physics steps")
+        return np.flatnonzero(~np.isnan(self._path[0, :, 0]))
+
+    def _culprit(self) -> str:
+        bad = ~np.isfinite(self.data.qvel) | (np.abs(self.data.qvel) > 1e6)
+        slots = [slot for slot, dofs in enumerate(self._agent_dofs) if bad[dofs].any()]
+        return f"; robots with an invalid velocity: {', '.join(agent_name(s).rstrip('/') for s in slots)}" if slots else ""
+
+    # Contacts
+
+    def new_touches(self) -> list[Touch]:
+        """Touches that began since the last call; they go on growing while the bodies touch.
+
+        Returns:
+            In order of time.
+        """
+        touches, self._new_touches = self._new_touches, []
+        return touches
+
+    def _note_touches(self, time: float, pairs: IntArray, touching: IntArray, path_velocity: Array | None) -> None:
+        timestep = self.model.opt.timestep
+        forces: dict[tuple[int, int], float] = {}
+        for i in touching:
+            key = (int(min(pairs[i])), int(max(pairs[i])))
+            mujoco.mj_contactForce(self.model.ptr, self.data.ptr, int(i), self._force)
+            forces[key] = forces.get(key, 0.0) + float(self._force[0])
+            touch = self._touches.get(key)
+            # Contacts are found at the beginning of a step; the gap is between the last end and this beginning.
+            if touch is None or time - touch.last_time - timestep >= self.rearm_time - 1e-9:
+                touch = self._begin_touch(key, int(i), time, flip=pairs[i, 0] != key[0], path_velocity=path_velocity)
+                self._touches[key] = touch
+                self._new_touches.append(touch)
+            touch.last_time = time
+        for key, force in forces.items():
+            touch = self._touches[key]
+            touch.impulse += force * timestep
+            touch.peak_force = max(touch.peak_force, force)
+
+    def _begin_touch(
+        self, key: tuple[int, int], contact: int, time: float, *, flip: bool, path_velocity: Array | None
+    ) -> Touch:
+        agent, other = key
+        normal = self.data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
+        length = float(np.linalg.norm(normal))
+        heading = self.agent_heading()
+        if other < self.n_agents:
+            kind, partner = Partner.AGENT, other
+            partner_heading = float(heading[partner])
+            partner_velocity = self._velocity_before[self._qvel[partner] : self._qvel[partner] + 2].copy()
+        else:
+            kind, partner = Partner.PEDESTRIAN, other - self.n_agents
+            partner_heading = float(yaw_of_quaternion(self.data.mocap_quat[self._mocap[partner]]))
+            partner_velocity = np.zeros(2) if path_velocity is None else path_velocity[partner].copy()
+        return Touch(
+            agent=agent,
+            kind=kind,
+            partner=partner,
+            time=time,
+            last_time=time,
+            position=self.data.contact.pos[contact, :2].copy(),
+            normal=normal / length if length > 0.0 else np.array([1.0, 0.0]),
+            agent_heading=float(heading[agent]),
+            partner_heading=partner_heading,
+            agent_velocity=self._velocity_before[self._qvel[agent] : self._qvel[agent] + 2].copy(),
+            partner_velocity=partner_velocity,
+        )

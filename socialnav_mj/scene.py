@@ -1,0 +1,122 @@
+"""Assembly of the MJCF scene: the arena, a pool of robots, a pool of mocap pedestrians."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from socialnav_mj.config import Robot, Scenario
+from socialnav_mj.geometry import Array
+from socialnav_mj.resources import assets_folder
+
+AGENT_PREFIX = "agent_"
+PEDESTRIAN_PREFIX = "pedestrian_"
+_TOLERANCE = 1e-6
+
+
+def agent_name(slot: int) -> str:
+    """Prefix of all names of one robot.
+
+    Args:
+        slot: Slot index.
+
+    Returns:
+        Such as "agent_003/".
+    """
+    return f"{AGENT_PREFIX}{slot:03d}/"
+
+
+def pedestrian_name(slot: int) -> str:
+    """Prefix of all names of one pedestrian.
+
+    Args:
+        slot: Slot index.
+
+    Returns:
+        Such as "pedestrian_003/".
+    """
+    return f"{PEDESTRIAN_PREFIX}{slot:03d}/"
+
+
+def build_model(
+    scenario: Scenario, *, n_agent_slots: int, n_pedestrian_slots: int, low: Array, high: Array
+) -> mujoco.MjModel:
+    """Compile the scene.
+
+    Args:
+        scenario: Gives radii, limits and the physics time step.
+        n_agent_slots: Robots in the pool, >= 1.
+        n_pedestrian_slots: Mocap bodies in the pool, >= 1.
+        low: Least coordinates of the recorded crowd, shape (2,) [m].
+        high: Greatest coordinates, shape (2,) [m].
+
+    Returns:
+        The model. Robots are compiled with gravity compensation, so that parked ones need no floor.
+
+    Raises:
+        FileNotFoundError: If the robot's MJCF file does not exist.
+        ValueError: If the MJCF file contradicts the robot's configuration.
+    """
+    assets = assets_folder()
+    arena = mujoco.MjSpec.from_file(str(assets / "arena.xml"))
+    arena.option.timestep = scenario.physics_timestep
+    arena.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    _aim_cameras(arena, low=low, high=high)
+
+    for slot in range(n_agent_slots):
+        robot = mujoco.MjSpec.from_file(str(_robot_file(scenario.robot, assets)))
+        robot.geom("bumper").size[0] = scenario.robot.radius
+        robot.actuator("forward").ctrlrange = [0.0, scenario.robot.max_speed]
+        robot.actuator("yaw").ctrlrange = [-scenario.max_yaw_rate, scenario.max_yaw_rate]
+        for body in robot.bodies[1:]:
+            body.gravcomp = 1.0
+        arena.attach(robot, prefix=agent_name(slot), frame=arena.worldbody.add_frame())
+    for slot in range(n_pedestrian_slots):
+        person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
+        person.geom("body").size[0] = scenario.pedestrian_radius
+        arena.attach(person, prefix=pedestrian_name(slot), frame=arena.worldbody.add_frame())
+    model = arena.compile()
+    _check_robot(model, scenario.robot)
+    return model
+
+
+def _robot_file(robot: Robot, assets: Path) -> Path:
+    path = assets / robot.model
+    if not path.is_file():
+        raise FileNotFoundError(f"Robot.model = {robot.model!r}: there is no file {path}")
+    return path
+
+
+def _check_robot(model: mujoco.MjModel, robot: Robot) -> None:
+    """Compare the wheels and tendons of the MJCF file with the configuration that maps wheel speeds to twists."""
+    prefix = agent_name(0)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    left = data.joint(prefix + "left_wheel").xanchor
+    right = data.joint(prefix + "right_wheel").xanchor
+    half = {"forward": (0.5, 0.5), "yaw": (-1.0 / robot.track, 1.0 / robot.track)}
+    found = {
+        "track": (float(np.linalg.norm(left - right)), robot.track),
+        "wheel_radius": (float(model.geom(prefix + "left_wheel").size[0]), robot.wheel_radius),
+    }
+    for tendon, (left_gain, right_gain) in half.items():
+        address = model.tendon_adr[model.tendon(prefix + tendon).id]
+        coefficients = dict(zip(model.wrap_objid[address : address + 2], model.wrap_prm[address : address + 2], strict=True))
+        for wheel, gain in (("left_wheel", left_gain), ("right_wheel", right_gain)):
+            joint = model.joint(prefix + wheel).id
+            found[f"{tendon} tendon's {wheel} coefficient"] = (coefficients[joint], gain * robot.wheel_radius)
+    for name, (given, wanted) in found.items():
+        if abs(given - wanted) > _TOLERANCE:
+            raise ValueError(f"{robot.model}: {name} is {given:.6g}, but the Robot configuration says {wanted:.6g}")
+
+
+def _aim_cameras(arena: mujoco.MjSpec, *, low: Array, high: Array) -> None:
+    """Centre floor and cameras on the crowd, high or far enough to show all of it."""
+    centre, size = 0.5 * (low + high), float(np.max(high - low))
+    arena.stat.center = [*centre, 0.0]
+    arena.stat.extent = max(size, 1.0)
+    arena.geom("floor").pos[:2] = centre
+    for name in ("top", "oblique"):
+        camera = arena.camera(name)
+        half_angle = np.radians(0.5 * camera.fovy)
+        camera.pos = np.array([*centre, 0.0]) + camera.pos / np.linalg.norm(camera.pos) * 0.6 * size / np.tan(half_angle)
