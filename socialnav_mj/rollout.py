@@ -17,7 +17,6 @@ from socialnav_mj.geometry import Array
 from socialnav_mj.recordings import Recording
 from socialnav_mj.task import CrowdTask
 
-HUMAN = "human"
 _PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "scipy")
 _PROGRESS_PERIOD = 25
 
@@ -200,7 +199,19 @@ def recorded_series(
     steps: int,
     dt: float,
 ) -> tuple[Array, Array, Array]:
-    """Recorded motion of some people at the control steps at which they are there."""
+    """Recorded motion of some people at the control steps at which they are there.
+
+    Args:
+        recording: The crowd.
+        index: Indices into it, shape (k,).
+        first: First control step of each, shape (k,).
+        last: Last control step, included, shape (k,).
+        steps: Number of control steps of the result.
+        dt: Control time step [s].
+
+    Returns:
+        Position (steps, k, 2) [m], velocity (steps, k, 2) [m/s] and heading (steps, k) [rad]; NaN where absent.
+    """
     position, heading = np.full((steps, len(index), 2), np.nan), np.full((steps, len(index)), np.nan)
     velocity = np.full_like(position, np.nan)
     for column, person in enumerate(index):
@@ -210,7 +221,32 @@ def recorded_series(
     return position, velocity, heading
 
 
+def state_hash(*arrays: Array) -> str:
+    """SHA-256 of arrays' bytes.
+
+    Args:
+        *arrays: In order.
+
+    Returns:
+        Hexadecimal digits.
+    """
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
 def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> dict[str, Any]:
+    """All that makes an episode traceable.
+
+    Args:
+        recording: The crowd.
+        scenario: The resolved scenario.
+        **rest: Further JSON values: controller, controller_config, scenario_name, state_hash.
+
+    Returns:
+        The value of `Episode.metadata`.
+    """
     return {
         **rest,
         "scenario": scenario.as_dict(),
