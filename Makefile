@@ -1,0 +1,72 @@
+# Needs python3 (3.11 or 3.12) with its venv module and pip; everything else is installed into $(VENV).
+PYTHON ?= python3
+VENV ?= .venv
+OUT ?= runs/demo
+
+BIN := $(VENV)/bin
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
+# One stamp for each kind of environment; another Python gets another stamp, and so an environment made anew.
+PLAIN := $(VENV)/plain-$(VERSION).stamp
+ALL := $(VENV)/all-$(VERSION).stamp
+INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --quiet -c constraints.txt
+
+# Recordings that may not travel with the project; tests that need them are skipped where they are not.
+ifndef SOCIALNAV_MJ_DATA
+ifneq ($(wildcard ../shared/data),)
+export SOCIALNAV_MJ_DATA := $(abspath ../shared/data)
+endif
+endif
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test slow lint format clean python-version
+
+help:
+	@echo "make demo     run the four scenarios on the embedded recording; results in $(OUT)"
+	@echo "make test     lint, then the tests"
+	@echo "make slow     the longer checks"
+	@echo "make lint     format check, lint, types"
+	@echo "make format   format and mend what can be mended"
+	@echo "make clean    remove the environment and the caches, not the results"
+	@echo "Choose a Python with PYTHON=python3.12; it has to be 3.11 or 3.12."
+
+demo: $(PLAIN)
+	$(BIN)/socialnav-mj evaluate --dataset plaza --scenarios 1 2 3 4 --out $(OUT)
+	@echo "Tables: $(OUT)/report.md and summary.csv. Traces: 'rerun $(OUT)/traces/*.rrd' ($(BIN)/rerun)."
+
+test: lint
+	$(BIN)/python -m pytest
+
+slow: $(ALL)
+	$(BIN)/python -m pytest -m slow
+
+lint: $(ALL)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: $(ALL)
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+python-version:
+	@case "$(VERSION)" in \
+	3.11|3.12) ;; \
+	"") echo "'$(PYTHON)' does not run; install Python 3.11 or 3.12, or name one: make PYTHON=/path/to/python3.12 ..." >&2; exit 1 ;; \
+	*) echo "'$(PYTHON)' is Python $(VERSION); 3.11 and 3.12 are supported (dm-control has no wheels for others)." >&2; \
+	   echo "Name one of these: make PYTHON=python3.12 ..." >&2; exit 1 ;; \
+	esac
+
+$(PLAIN): pyproject.toml constraints.txt | python-version
+	@[ -x $(BIN)/python$(VERSION) ] || { echo "Making $(VENV) with Python $(VERSION)"; $(PYTHON) -m venv --clear $(VENV); }
+	@echo "Installing (1.1 GB, about half a minute)"
+	@$(INSTALL) -e .
+	@touch $@
+
+$(ALL): pyproject.toml constraints.txt | python-version
+	@[ -x $(BIN)/python$(VERSION) ] || { echo "Making $(VENV) with Python $(VERSION)"; $(PYTHON) -m venv --clear $(VENV); }
+	@echo "Installing with training and development tools (some minutes)"
+	@$(INSTALL) -e '.[all]'
+	@touch $(PLAIN) $@
