@@ -13,6 +13,9 @@ MOVING_SPEED = 0.1
 HEADING_TIMESTEP = 0.04
 """Spacing of the times, on each person's own track, at which motion is looked for; one UCY video frame [s]."""
 
+TIME_TOLERANCE = 1e-6
+"""A time this near a track's end is on it, so that rounding does not decide who is there [s]."""
+
 
 class Curves:
     """Positions, velocities and headings of n people at any time."""
@@ -40,6 +43,20 @@ class Curves:
         self._key = self._segment_start - self._origin + people * self._span
         self._tabulate_headings()
 
+    def present(self, people: NDArray[np.int64], times: ArrayLike) -> NDArray[np.bool_]:
+        """Whether times are on the tracks, ends included.
+
+        Args:
+            people: Indices of people, any shape that broadcasts with `times`.
+            times: [s].
+
+        Returns:
+            Of the broadcast shape.
+        """
+        times = np.asarray(times, dtype=float)
+        late, early = times >= self.start[people] - TIME_TOLERANCE, times <= self.end[people] + TIME_TOLERANCE
+        return np.asarray(late & early)
+
     def position_and_velocity(self, people: NDArray[np.int64], times: ArrayLike) -> tuple[Array, Array]:
         """Evaluate; outside a track the nearest end's position and velocity 0.
 
@@ -51,7 +68,7 @@ class Curves:
             Positions [m] and velocities [m/s], both of the broadcast shape with a last axis of 2.
         """
         people, times = np.broadcast_arrays(people, np.asarray(times, dtype=float))
-        inside = (times >= self.start[people]) & (times <= self.end[people])
+        inside = self.present(people, times)
         clamped = np.clip(times, self.start[people], self.end[people])
         key = clamped - self._origin + people * self._span
         segment = np.searchsorted(self._key, key, side="right") - 1

@@ -159,7 +159,7 @@ class Recording:
             included.
         """
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        present = (times[:, None] >= self.start_time) & (times[:, None] <= self.end_time)
+        present = self.curves.present(np.arange(self.n_people), times[:, None])
         rows, people = np.nonzero(present)
         position = np.full((*present.shape, 2), np.nan)
         velocity = np.full((*present.shape, 2), np.nan)

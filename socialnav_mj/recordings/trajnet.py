@@ -37,7 +37,8 @@ def read_ndjson(path: Path) -> tuple[Samples, float | None]:
     """Read TrajNet++ lines.
 
     Positions are `{"track": {"f": frame, "p": id, "x": metres, "y": metres}}`; of the scenes,
-    `{"scene": {..., "fps": rows a second}}`, only fps is used. Rows of predictions (with `prediction_number`) are not recordings and are refused.
+    `{"scene": {..., "fps": rows a second}}`, only fps is used. Rows of predictions (with `prediction_number`) are no
+    recordings and are refused.
 
     Args:
         path: The file.

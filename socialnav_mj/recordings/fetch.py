@@ -1,0 +1,92 @@
+"""Download recordings of the catalogue from their public source, checked by sha256."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pooch
+from pooch.downloaders import HTTPDownloader
+
+from socialnav_mj.recordings.catalogue import CatalogueRow, catalogue, catalogue_row
+
+Progress = Callable[[str, int, int], None]
+"""Called with file name, bytes so far and bytes in total (0: the server does not say)."""
+TIMEOUT = 30.0
+"""Longest silence of the server [s]."""
+
+
+class FetchError(RuntimeError):
+    """A download failed; the message says of what, from where and why."""
+
+
+def fetch(name: str, *, data_dir: str | Path | None = None, progress: Progress | None = None) -> tuple[Path, ...]:
+    """Download all files of a recording; those that are there and right are kept.
+
+    Args:
+        name: In the catalogue.
+        data_dir: Where to; None is the user's cache, where `load_recording` looks without being told.
+        progress: Told of every chunk.
+
+    Returns:
+        The files.
+
+    Raises:
+        ValueError: If the name is unknown or the recording is embedded.
+        FetchError: If a download fails or is not what the catalogue expects; the failed file leaves nothing behind.
+    """
+    row = catalogue_row(name)
+    if row.url is None:
+        others = ", ".join(other.name for other in catalogue().values() if other.url)
+        raise ValueError(f"recording {name!r} is embedded, there is nothing to fetch; can be fetched: {others}")
+    root = Path(pooch.os_cache("socialnav-mj")) if data_dir is None else Path(data_dir).expanduser()
+    return fetch_row(row, root, progress=progress)
+
+
+def fetch_row(row: CatalogueRow, root: Path, *, progress: Progress | None = None) -> tuple[Path, ...]:
+    """Download all files of a catalogue row.
+
+    Args:
+        row: With a url.
+        root: Data directory; the files go into `root / row.folder`.
+        progress: Told of every chunk.
+
+    Returns:
+        The files, in the order of the row's variants.
+
+    Raises:
+        FetchError: See `fetch`.
+    """
+    expected = {name: digest for files in row.variants.values() for name, digest in files.items()}
+    folder = root / row.folder
+    paths = []
+    for name, digest in expected.items():
+        url = f"{row.url}{name}"
+        bar = None if progress is None else _Bar(name, progress)
+        downloader = HTTPDownloader(progressbar=bar, timeout=TIMEOUT)
+        try:
+            path = pooch.retrieve(url, f"sha256:{digest}", fname=name, path=folder, downloader=downloader)
+        except (OSError, ValueError) as error:
+            # requests' errors are OSErrors; pooch reports a wrong checksum, with both sums, as ValueError.
+            raise FetchError(
+                f"could not fetch {folder / name} of recording {row.name!r} from {url}: {error}"
+            ) from error
+        paths.append(Path(path))
+    return tuple(paths)
+
+
+class _Bar:
+    """What pooch expects of a progress bar."""
+
+    def __init__(self, name: str, progress: Progress) -> None:
+        self.total = 0
+        self._name, self._progress, self._done = name, progress, 0
+
+    def update(self, n: int) -> None:
+        # pooch adds whole chunks, and at the end resets and adds the total.
+        self._done += n
+        self._progress(self._name, min(self._done, self.total) if self.total else self._done, self.total)
+
+    def reset(self) -> None:
+        self._done = 0
+
+    def close(self) -> None:
+        pass
