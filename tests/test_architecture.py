@@ -21,7 +21,7 @@ ROWS = (
     {"cast", "scene", "physics", "task"},
     {"tasks"},
     {"controllers"},
-    {"rollout", "evaluation"},
+    {"rollout", "human", "evaluation"},
     {"metrics"},
     {"analysis"},
     {"learning"},
