@@ -1,0 +1,217 @@
+"""Episode files -> one table with a row for every agent."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from socialnav_mj.episode import Episode, EpisodeError, Partner
+from socialnav_mj.metrics import per_agent
+
+HUMAN = "human"
+"""Name of the controller under which the recorded people themselves are scored."""
+
+SCHEMA = pa.schema(
+    [
+        ("dataset", pa.string()),
+        ("variant", pa.string()),
+        ("scenario", pa.string()),
+        ("share", pa.float64()),
+        ("controller", pa.string()),
+        ("draw", pa.int64()),
+        ("agent", pa.int64()),
+        ("person", pa.int64()),
+        ("success", pa.bool_()),
+        ("arrived", pa.bool_()),
+        ("timed_out", pa.bool_()),
+        ("never_spawned", pa.bool_()),
+        ("completion_time", pa.float64()),
+        ("completion_steps", pa.int64()),
+        ("time_under_way", pa.float64()),
+        ("completion_censored", pa.bool_()),
+        ("active_steps", pa.int64()),
+        ("displacement", pa.float64()),
+        ("path_length", pa.float64()),
+        ("distance_to_displacement", pa.float64()),
+        ("average_speed", pa.float64()),
+        ("intimate_intrusions", pa.int64()),
+        ("intrusion_share", pa.float64()),
+        ("minimum_distance", pa.float64()),
+        ("collisions_pedestrian", pa.int64()),
+        ("collisions_agent", pa.int64()),
+        ("first_partner", pa.string()),
+        ("spawn_delay", pa.float64()),
+        ("episode", pa.string()),
+        ("state_hash", pa.string()),
+    ]
+)
+"""Columns of the agents' table: metrics as `socialnav_mj.metrics` defines them, null where they are NaN; `episode` is
+the file the row comes from, `first_partner` is "pedestrian", "agent" or null."""
+
+_METADATA = ("controller", "controller_config", "scenario", "scenario_name", "draw", "recording", "state_hash")
+_RECORDING = ("name", "variant", "checksum")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """Where one episode's rows come from: its file and what the file says about itself."""
+
+    file: str
+    """Name of the episode's file."""
+    metadata: dict[str, Any]
+    """The episode's metadata."""
+
+    @property
+    def group(self) -> tuple[str, str, str, str]:
+        """(dataset, variant, scenario, controller): episodes that differ in the draw alone share it."""
+        recording = self.metadata["recording"]
+        name = self.metadata["scenario_name"]
+        return str(recording["name"]), str(recording["variant"]), str(name), str(self.metadata["controller"])
+
+    @property
+    def draw(self) -> int:
+        """Seed of the permutation of people."""
+        return int(self.metadata["draw"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """All agents of a run, and the episodes they come from, in the same order."""
+
+    agents: pa.Table
+    """Columns of `SCHEMA`."""
+    sources: tuple[Source, ...]
+    """One for each episode, even without agents."""
+
+
+def agents_table(episode: Episode, *, file: str = "") -> pa.Table:
+    """One row for every agent of an episode.
+
+    Args:
+        episode: The record; its metadata fill the descriptive columns.
+        file: Name of its file, for the column `episode`.
+
+    Returns:
+        Columns of `SCHEMA`, rows in the order of the agents.
+
+    Raises:
+        EpisodeError: If the metadata lack a key that is needed.
+    """
+    source = Source(file=file, metadata=_checked_metadata(episode))
+    dataset, variant, scenario, controller = source.group
+    n = episode.n_agents
+    metrics = per_agent(episode)
+    values: dict[str, NDArray[Any] | list[str | None]] = dict(metrics)
+    names = {int(partner): partner.name.lower() for partner in Partner}
+    values["first_partner"] = [names.get(int(partner)) for partner in metrics["first_partner"]]
+    values |= {"agent": np.arange(n), "person": episode.agent_person}
+    constant = {
+        "dataset": dataset,
+        "variant": variant,
+        "scenario": scenario,
+        "share": float(episode.metadata["scenario"]["share"]),
+        "controller": controller,
+        "draw": source.draw,
+        "episode": file,
+        "state_hash": str(episode.metadata["state_hash"]),
+    }
+    columns = [
+        pa.array([constant[field.name]] * n, field.type)
+        if field.name in constant
+        else pa.array(values[field.name], from_pandas=True).cast(field.type)
+        for field in SCHEMA
+    ]
+    return pa.table(columns, schema=SCHEMA)
+
+
+def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs: int = 1) -> Results:
+    """Score every episode of a run; one episode at a time is in the memory of each process.
+
+    Args:
+        folder: The run; its episodes are `episodes/*.npz`.
+        controllers: Order of the controllers; others follow alphabetically, the human row is always last.
+        n_jobs: Processes that read (joblib).
+
+    Returns:
+        Rows ordered by dataset, share, scenario, controller, draw and agent.
+
+    Raises:
+        FileNotFoundError: If there is no episode.
+        EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, or if episodes that
+            would be averaged or compared differ in their configuration; the files are named.
+    """
+    paths = sorted((Path(folder) / "episodes").glob("*.npz"))
+    if not paths:
+        raise FileNotFoundError(f"no episodes in {Path(folder) / 'episodes'}; expected *.npz files")
+    read = joblib.Parallel(n_jobs=n_jobs)(joblib.delayed(_read)(path) for path in paths)
+    places = {name: place for place, name in enumerate(controllers)}
+
+    def key(item: tuple[Source, pa.Table]) -> tuple[Any, ...]:
+        source = item[0]
+        dataset, variant, scenario, controller = source.group
+        place = places.get(controller, len(places))
+        share = float(source.metadata["scenario"]["share"])
+        return dataset, variant, share, scenario, controller == HUMAN, place, controller, source.draw, source.file
+
+    read.sort(key=key)
+    sources = tuple(source for source, _ in read)
+    _check_comparable(sources)
+    return Results(agents=pa.concat_tables([table for _, table in read]), sources=sources)
+
+
+def _read(path: Path) -> tuple[Source, pa.Table]:
+    episode = Episode.load(path)
+    try:
+        return Source(file=path.name, metadata=episode.metadata), agents_table(episode, file=path.name)
+    except (EpisodeError, KeyError, TypeError) as error:
+        raise EpisodeError(f"{path} cannot be scored: {error}") from error
+
+
+def _checked_metadata(episode: Episode) -> dict[str, Any]:
+    metadata = episode.metadata
+    missing = [key for key in _METADATA if key not in metadata]
+    missing += [f"recording.{key}" for key in _RECORDING if key not in metadata.get("recording", {})]
+    if missing:
+        raise EpisodeError(f"its metadata lack {', '.join(missing)}; there are {', '.join(sorted(metadata))}")
+    return metadata
+
+
+def scenario_configuration(source: Source) -> dict[str, Any]:
+    """The scenario of an episode without what sets its draws apart.
+
+    Args:
+        source: An episode's description.
+
+    Returns:
+        `Scenario.as_dict` without the seed.
+    """
+    return {key: value for key, value in source.metadata["scenario"].items() if key != "seed"}
+
+
+def _check_comparable(sources: Sequence[Source]) -> None:
+    """Rows of one table must differ in the controller alone, and the episodes of one row in the draw alone."""
+    first: dict[tuple[str, ...], tuple[Source, Any]] = {}
+    seen: dict[tuple[Any, ...], Source] = {}
+    for source in sources:
+        dataset, variant, scenario, controller = source.group
+        twin = seen.setdefault((*source.group, source.draw), source)
+        if twin is not source:
+            name = " / ".join(source.group)
+            raise EpisodeError(f"{twin.file} and {source.file} are both draw {source.draw} of {name}; remove one")
+        for key, configuration in (
+            ((dataset, variant, "scenario", scenario), scenario_configuration(source)),
+            ((dataset, variant, "controller", controller), source.metadata["controller_config"]),
+            ((dataset, variant, "recording", ""), source.metadata["recording"]),
+        ):
+            model, expected = first.setdefault(key, (source, configuration))
+            if json.dumps(configuration, sort_keys=True) != json.dumps(expected, sort_keys=True):
+                raise EpisodeError(
+                    f"{model.file} and {source.file} have different configurations of {' / '.join(key).rstrip(' /')}: "
+                    f"{expected} and {configuration}; put them in different folders"
+                )
