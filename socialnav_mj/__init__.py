@@ -18,7 +18,7 @@ def load(
 
     Args:
         task_name: One of `tasks.ALL_TASKS`.
-        task_kwargs: Keyword arguments of `socialnav_mj.task.make_environment`.
+        task_kwargs: Keyword arguments of `socialnav_mj.environment.make_environment`.
         environment_kwargs: Keyword arguments of `dm_control.rl.control.Environment`.
 
     Returns:

@@ -83,7 +83,13 @@ class Scenario:
         )
         for name in ("pedestrian_radius", "control_timestep", "physics_timestep", "goal_radius"):
             _require(getattr(self, name) > 0.0, name, getattr(self, name), "numbers > 0")
-        for name in ("deadline_base", "deadline_per_metre", "minimum_displacement", "spawn_clearance", "contact_rearm_time"):
+        for name in (
+            "deadline_base",
+            "deadline_per_metre",
+            "minimum_displacement",
+            "spawn_clearance",
+            "contact_rearm_time",
+        ):
             _require(getattr(self, name) >= 0.0, name, getattr(self, name), "numbers >= 0")
         _require(
             abs(self.control_timestep / self.physics_timestep - self.n_sub_steps) < 1e-6,

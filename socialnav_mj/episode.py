@@ -1,17 +1,19 @@
 """The record of everything that happened in one episode; all that comes later is made from it alone."""
 
 import json
-import os
-import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+
+from socialnav_mj.files import written_whole
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -219,20 +221,11 @@ class Episode:
         Returns:
             The path written.
         """
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("policies", "metadata")}
         header = {"format": FORMAT, "policies": list(self.policies), "metadata": self.metadata}
-        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False) as file:
-            try:
-                np.savez_compressed(file, header=np.array(json.dumps(header)), **arrays)
-                file.flush()
-                os.fsync(file.fileno())
-                os.replace(file.name, path)
-            except BaseException:
-                Path(file.name).unlink(missing_ok=True)
-                raise
-        return path
+        with written_whole(path) as part:
+            np.savez_compressed(part, header=np.array(json.dumps(header)), **arrays)
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> "Episode":
@@ -248,34 +241,48 @@ class Episode:
             FileNotFoundError: If there is no such file.
             EpisodeError: If the file is damaged or not an episode of this format.
         """
-        path = Path(path)
         expected = {f.name for f in fields(cls)} - {"policies", "metadata"}
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                if not hasattr(file, "files") or "header" not in file.files:
-                    raise EpisodeError("it has no header")
-                header = json.loads(str(file["header"]))
-                if header.get("format") != FORMAT:
-                    raise EpisodeError(f"its format is {header.get('format')!r}; this version reads {FORMAT!r}")
-                if missing := expected - set(file.files):
-                    raise EpisodeError(f"it lacks {', '.join(sorted(missing))}")
-                if unknown := set(file.files) - expected - {"header"}:
-                    raise EpisodeError(f"it has unknown arrays {', '.join(sorted(unknown))}")
-                arrays = {name: file[name] for name in expected}
+        with _reading(path) as (file, header):
+            if missing := expected - set(file.files):
+                raise EpisodeError(f"it lacks {', '.join(sorted(missing))}")
+            if unknown := set(file.files) - expected - {"header"}:
+                raise EpisodeError(f"it has unknown arrays {', '.join(sorted(unknown))}")
+            arrays = {name: file[name] for name in expected}
             return cls(**arrays, policies=tuple(header["policies"]), metadata=header["metadata"])
-        except FileNotFoundError:
-            raise
-        except (
-            OSError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            EOFError,
-            zipfile.BadZipFile,
-            zlib.error,
-        ) as error:
-            raise EpisodeError(f"{path} is not a readable episode: {error}") from error
+
+
+def read_header(path: str | Path) -> dict[str, Any]:
+    """The small part of an episode file, without its arrays.
+
+    Args:
+        path: An npz file written by `Episode.save`.
+
+    Returns:
+        format, policies, metadata.
+
+    Raises:
+        FileNotFoundError: If there is no such file.
+        EpisodeError: If the file is damaged or not an episode of this format.
+    """
+    with _reading(path) as (_, header):
+        return header
+
+
+@contextmanager
+def _reading(path: str | Path) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Open an episode file and its header; everything that can be wrong with it becomes an EpisodeError."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if not hasattr(file, "files") or "header" not in file.files:
+                raise EpisodeError("it has no header")
+            header = json.loads(str(file["header"]))
+            if header.get("format") != FORMAT:
+                raise EpisodeError(f"its format is {header.get('format')!r}; this version reads {FORMAT!r}")
+            yield file, header
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, BadZipFile, zlib.error) as error:
+        raise EpisodeError(f"{path} is not a readable episode: {error}") from error
 
 
 _INTEGER_FIELDS = {

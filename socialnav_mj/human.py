@@ -51,9 +51,14 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
         recording, cast.pedestrian_index, cast.pedestrian_first_step, cast.pedestrian_last_step, steps, dt
     )
     people = [
-        *(_Person(int(i), Partner.AGENT, k, int(cast.agent_appear_step[k]), int(end[k])) for k, i in enumerate(cast.agent_index)),
         *(
-            _Person(int(i), Partner.PEDESTRIAN, k, int(cast.pedestrian_first_step[k]), int(cast.pedestrian_last_step[k]) + 1)
+            _Person(int(i), Partner.AGENT, k, int(cast.agent_appear_step[k]), int(end[k]))
+            for k, i in enumerate(cast.agent_index)
+        ),
+        *(
+            _Person(
+                int(i), Partner.PEDESTRIAN, k, int(cast.pedestrian_first_step[k]), int(cast.pedestrian_last_step[k]) + 1
+            )
             for k, i in enumerate(cast.pedestrian_index)
         ),
     ]

@@ -93,7 +93,9 @@ class Physics(MujocoPhysics):
         self._agent_geoms = [np.flatnonzero(root[model.geom_bodyid] == body) for body in robots]
         self._agent_dofs = [np.flatnonzero(root[model.dof_bodyid] == body) for body in robots]
         self._agent_joints = [np.flatnonzero(root[model.jnt_bodyid] == body) for body in robots]
-        self._pedestrian_geom = np.array([model.geom(pedestrian_name(i) + "body").id for i in range(self.n_pedestrians)])
+        self._pedestrian_geom = np.array(
+            [model.geom(pedestrian_name(i) + "body").id for i in range(self.n_pedestrians)]
+        )
         self._bits = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
         self._owner = np.full(model.ngeom, -1, dtype=np.int64)
         for slot in range(self.n_agents):
@@ -305,7 +307,9 @@ class Physics(MujocoPhysics):
     def _culprit(self) -> str:
         bad = ~np.isfinite(self.data.qvel) | (np.abs(self.data.qvel) > 1e6)
         slots = [slot for slot, dofs in enumerate(self._agent_dofs) if bad[dofs].any()]
-        return f"; robots with an invalid velocity: {', '.join(agent_name(s).rstrip('/') for s in slots)}" if slots else ""
+        return (
+            f"; robots with an invalid velocity: {', '.join(agent_name(s).rstrip('/') for s in slots)}" if slots else ""
+        )
 
     # Contacts
 

@@ -101,7 +101,9 @@ def _check_robot(model: mujoco.MjModel, robot: Robot) -> None:
     }
     for tendon, (left_gain, right_gain) in half.items():
         address = model.tendon_adr[model.tendon(prefix + tendon).id]
-        coefficients = dict(zip(model.wrap_objid[address : address + 2], model.wrap_prm[address : address + 2], strict=True))
+        coefficients = dict(
+            zip(model.wrap_objid[address : address + 2], model.wrap_prm[address : address + 2], strict=True)
+        )
         for wheel, gain in (("left_wheel", left_gain), ("right_wheel", right_gain)):
             joint = model.joint(prefix + wheel).id
             found[f"{tendon} tendon's {wheel} coefficient"] = (coefficients[joint], gain * robot.wheel_radius)
@@ -111,12 +113,14 @@ def _check_robot(model: mujoco.MjModel, robot: Robot) -> None:
 
 
 def _aim_cameras(arena: mujoco.MjSpec, *, low: Array, high: Array) -> None:
-    """Centre floor and cameras on the crowd, high or far enough to show all of it."""
-    centre, size = 0.5 * (low + high), float(np.max(high - low))
+    """Centre floor, light and cameras on the crowd, with a view of all of it."""
+    centre, size = 0.5 * (low + high), max(float(np.max(high - low)), 1.0)
     arena.stat.center = [*centre, 0.0]
-    arena.stat.extent = max(size, 1.0)
+    arena.stat.extent = size
     arena.geom("floor").pos[:2] = centre
-    for name in ("top", "oblique"):
-        camera = arena.camera(name)
-        half_angle = np.radians(0.5 * camera.fovy)
-        camera.pos = np.array([*centre, 0.0]) + camera.pos / np.linalg.norm(camera.pos) * 0.6 * size / np.tan(half_angle)
+    arena.light("sun").pos[:2] += centre
+    arena.camera("top").pos[:2] = centre
+    arena.camera("top").fovy = 1.1 * size  # orthographic: the height of the view [m]
+    oblique = arena.camera("oblique")
+    distance = 0.6 * size / np.tan(np.radians(0.5 * oblique.fovy))
+    oblique.pos = np.array([*centre, 0.0]) + oblique.pos / np.linalg.norm(oblique.pos) * distance

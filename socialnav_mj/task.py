@@ -1,23 +1,20 @@
 """What the scene means: who enters when, what an agent sees, what it gains, when its run ends."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from dm_control.rl import control
 from dm_control.suite import base
 from dm_env import specs
 from numpy.typing import NDArray
 
 from socialnav_mj.cast import NOBODY, Cast, Replay, cast_recording
-from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
+from socialnav_mj.config import Scenario
 from socialnav_mj.episode import IntArray, Outcome, Partner
 from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
 from socialnav_mj.observation import observe
 from socialnav_mj.physics import Physics, Touch
-from socialnav_mj.recordings import Recording, load_recording
-from socialnav_mj.scene import build_model
+from socialnav_mj.recordings import Recording
 
 PROGRESS_REWARD = 1.0
 """Reward per metre that an agent came nearer to its goal [1/m]."""
@@ -167,7 +164,9 @@ class CrowdTask(base.Task):
         active = self._slot_agent != NOBODY
         if not np.isfinite(action[active]).all():
             slot = int(np.flatnonzero(active & ~np.isfinite(action).all(axis=1))[0])
-            raise ValueError(f"action[{slot}] = {action[slot]} of an active agent at {self.time:.2f} s; expected finite wheel speeds")
+            raise ValueError(
+                f"action[{slot}] = {action[slot]} of an active agent at {self.time:.2f} s; expected finite wheel speeds"
+            )
         robot = self.scenario.robot
         twist = twist_of_wheel_speed(
             np.where(active[:, None], action, 0.0), wheel_radius=robot.wheel_radius, track=robot.track
@@ -340,83 +339,16 @@ class CrowdTask(base.Task):
         self._goal_distance[slots] = distance
         arrived = distance <= self.scenario.goal_radius
         late = self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]
-        taken_out = np.isin(slots, struck) if self.scenario.on_collision == "retire" else np.zeros(len(slots), dtype=bool)
+        taken_out = (
+            np.isin(slots, struck) if self.scenario.on_collision == "retire" else np.zeros(len(slots), dtype=bool)
+        )
         self._reward[slots[arrived & ~taken_out]] += ARRIVAL_REWARD
-        outcome = np.select([taken_out, arrived, late], [Outcome.COLLIDED, Outcome.ARRIVED, Outcome.TIMED_OUT], _UNDER_WAY)
+        outcome = np.select(
+            [taken_out, arrived, late], [Outcome.COLLIDED, Outcome.ARRIVED, Outcome.TIMED_OUT], _UNDER_WAY
+        )
         for slot, agent, result in zip(slots, agents, outcome, strict=True):
             if result != _UNDER_WAY:
                 self.outcome[agent] = result
                 self.end_step[agent] = self.step
                 self._slot_agent[slot] = NOBODY
                 physics.park_agent(int(slot))
-
-
-
-def make_environment(
-    *,
-    share: float,
-    dataset: str | Path | Recording = "plaza",
-    variant: str | None = None,
-    data_dir: str | Path | None = None,
-    seed: int | None = None,
-    robot_radius: float = Robot.radius,
-    pedestrian_radius: float = Scenario.pedestrian_radius,
-    turn_limit: TurnLimit = Scenario.turn_limit,
-    on_collision: OnCollision = Scenario.on_collision,
-    control_timestep: float = Scenario.control_timestep,
-    time_limit: float = float("inf"),
-    random: int | np.random.RandomState | None = None,
-    environment_kwargs: dict[str, Any] | None = None,
-) -> control.Environment:
-    """A scenario as a dm_control environment.
-
-    Args:
-        share: Share of the people who are replaced by agents, in (0, 1].
-        dataset: Name in the catalogue, path of a recording, or a recording.
-        variant: Which annotation of the recording; None is the default one.
-        data_dir: Where recordings are looked for first; None means SOCIALNAV_MJ_DATA, then the user cache.
-        seed: Of the draw. Scenarios of one seed are nested.
-        robot_radius: [m].
-        pedestrian_radius: [m].
-        turn_limit: "per_step" (pi/6 a control step) or "per_second" (pi/6 rad/s).
-        on_collision: "continue" or "retire".
-        control_timestep: A whole multiple of the physics step of 0.01 s [s].
-        time_limit: The episode is cut after this time; by default it ends when the last agent's run has [s].
-        random: As in dm_control. An integer is another name for `seed`, None for 0.
-        environment_kwargs: Passed to `dm_control.rl.control.Environment`.
-
-    Returns:
-        An environment whose task is a `CrowdTask`.
-
-    Raises:
-        ValueError: If a value is not allowed, or seed and an integer random are both given.
-        FileNotFoundError: If the recording is not there.
-    """
-    if isinstance(random, int) and seed is not None:
-        raise ValueError(f"seed = {seed} and random = {random} are both given; they name the same thing, give one")
-    scenario = Scenario(
-        share=share,
-        seed=random if isinstance(random, int) else seed or 0,
-        robot=Robot(radius=robot_radius),
-        pedestrian_radius=pedestrian_radius,
-        turn_limit=turn_limit,
-        on_collision=on_collision,
-        control_timestep=control_timestep,
-    )
-    recording = dataset if isinstance(dataset, Recording) else load_recording(dataset, variant=variant, data_dir=data_dir)
-    task = CrowdTask(recording, scenario, random=random)
-    everywhere = np.concatenate(recording.positions)
-    model = build_model(
-        scenario,
-        n_agent_slots=task.cast.n_agent_slots,
-        n_pedestrian_slots=task.cast.n_pedestrian_slots,
-        low=everywhere.min(axis=0),
-        high=everywhere.max(axis=0),
-    )
-    return control.Environment(
-        Physics.from_mujoco(model, rearm_time=scenario.contact_rearm_time),
-        task,
-        control_timestep=scenario.control_timestep,
-        time_limit=time_limit,
-        **(environment_kwargs or {}),
-    )

@@ -2,7 +2,7 @@
 
 `tasks.load("scenario_1")` returns an environment; after `tasks.register_with_dm_control()` so does
 `dm_control.suite.load("socialnav", "scenario_1")`. All keyword arguments of
-`socialnav_mj.task.make_environment` can be given in `task_kwargs`.
+`socialnav_mj.environment.make_environment` can be given in `task_kwargs`.
 """
 
 import inspect
@@ -13,34 +13,36 @@ from dm_control.rl import control
 # dm_control.utils.containers cannot be the first import of dm_control.
 from dm_control.utils import containers
 
-from socialnav_mj.task import make_environment
+from socialnav_mj.environment import make_environment
 
 DOMAIN = "socialnav"
 SUITE = containers.TaggedTasks()
+SHARES = {"scenario_1": 0.1, "scenario_2": 0.3, "scenario_3": 0.7, "scenario_4": 0.9}
+"""Share of the people who are replaced by robots (paper section IV)."""
 
 
 @SUITE.add("benchmarking", "no_reward_visualization")
 def scenario_1(**task_kwargs: Any) -> control.Environment:
     """10 % of the people are replaced by robots, a few robots in a crowd of people (paper section IV)."""
-    return make_environment(**{"share": 0.1, **task_kwargs})
+    return make_environment(**{"share": SHARES["scenario_1"], **task_kwargs})
 
 
 @SUITE.add("benchmarking", "no_reward_visualization")
 def scenario_2(**task_kwargs: Any) -> control.Environment:
     """30 % of the people are replaced by robots (paper section IV)."""
-    return make_environment(**{"share": 0.3, **task_kwargs})
+    return make_environment(**{"share": SHARES["scenario_2"], **task_kwargs})
 
 
 @SUITE.add("benchmarking", "no_reward_visualization")
 def scenario_3(**task_kwargs: Any) -> control.Environment:
     """70 % of the people are replaced by robots (paper section IV)."""
-    return make_environment(**{"share": 0.7, **task_kwargs})
+    return make_environment(**{"share": SHARES["scenario_3"], **task_kwargs})
 
 
 @SUITE.add("benchmarking", "no_reward_visualization")
 def scenario_4(**task_kwargs: Any) -> control.Environment:
     """90 % of the people are replaced by robots, many robots among a few people (paper section IV)."""
-    return make_environment(**{"share": 0.9, **task_kwargs})
+    return make_environment(**{"share": SHARES["scenario_4"], **task_kwargs})
 
 
 ALL_TASKS: tuple[str, ...] = tuple(SUITE)
@@ -56,7 +58,7 @@ def load(
 
     Args:
         task_name: One of `ALL_TASKS`.
-        task_kwargs: Keyword arguments of `socialnav_mj.task.make_environment`.
+        task_kwargs: Keyword arguments of `socialnav_mj.environment.make_environment`.
         environment_kwargs: Keyword arguments of `dm_control.rl.control.Environment`.
         visualize_reward: As in `dm_control.suite.load`; these tasks colour nothing by reward.
 

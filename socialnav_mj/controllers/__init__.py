@@ -1,5 +1,6 @@
 """Controllers by name: the built-in ones, those of installed packages, and any class by its path."""
 
+import ast
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -28,12 +29,13 @@ def available() -> tuple[str, ...]:
     return (*BUILT_IN, *(name for name in offered if name not in BUILT_IN))
 
 
-def make_controller(name: str, **config: Any) -> Controller:
-    """A controller by name.
+def make_controller(spec: str) -> Controller:
+    """A controller by name, with its configuration if need be.
 
     Args:
-        name: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class".
-        **config: Keyword arguments of the class.
+        spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class"; keyword
+            arguments of literals may follow, as in "potential_field(attraction_limit=None)". With them a dataclass
+            with a field `name` is named by the whole spec, so that two configurations can stand in one table.
 
     Returns:
         The controller.
@@ -41,7 +43,10 @@ def make_controller(name: str, **config: Any) -> Controller:
     Raises:
         ValueError: If there is no such controller, or it does not take the configuration.
     """
+    name, config = _parse(spec)
     factory = _factory(name)
+    if config and is_dataclass(factory) and "name" in {field.name for field in fields(factory)}:
+        config.setdefault("name", spec)
     try:
         controller = factory(**config)
     except TypeError as error:
@@ -65,6 +70,21 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     if is_dataclass(controller):
         result |= {field.name: getattr(controller, field.name) for field in fields(controller)}
     return result
+
+
+def _parse(spec: str) -> tuple[str, dict[str, Any]]:
+    name, bracket, rest = spec.partition("(")
+    if not bracket:
+        return spec, {}
+    try:
+        call = ast.parse(f"f({rest}", mode="eval").body
+        if not isinstance(call, ast.Call) or call.args:
+            raise ValueError("only keyword arguments are allowed")
+        return name, {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords if keyword.arg}
+    except (SyntaxError, ValueError) as error:
+        raise ValueError(
+            f"controller {spec!r} cannot be read: {error}; expected name or name(key=literal, ...)"
+        ) from None
 
 
 def _factory(name: str) -> Callable[..., Controller]:
