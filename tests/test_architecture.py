@@ -15,10 +15,10 @@ PACKAGES = ("socialnav_mj", "tasks")
 # Top to bottom: a room may import from its own row and from the rows above it. `episode` stands above the simulator
 # although it is filled after it: it is a record of numpy arrays, and physics and task share its Outcome and Partner.
 ROWS = (
-    {"resources", "geometry", "config"},
+    {"resources", "geometry", "config", "files"},
     {"recordings"},
     {"observation", "episode"},
-    {"cast", "scene", "physics", "task"},
+    {"cast", "scene", "physics", "task", "environment"},
     {"tasks"},
     {"controllers"},
     {"rollout", "human", "evaluation"},
@@ -34,8 +34,8 @@ EXCEPTIONS = {("socialnav_mj", "tasks")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
 # dm_control's Environment in their signatures.
 ONLY_IN = {
-    "mujoco": {"scene", "physics", "task", "tasks"},
-    "dm_control": {"scene", "physics", "task", "tasks", "rollout", "socialnav_mj"},
+    "mujoco": {"scene", "physics", "task", "environment", "tasks"},
+    "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "socialnav_mj"},
     "matplotlib": {"analysis"},
     "rerun": {"analysis"},
     "torch": {"learning"},
