@@ -1,0 +1,106 @@
+"""Touches and other events of an episode, told in words."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.episode import Episode, Outcome, Partner
+
+Index = NDArray[np.int64]
+
+
+def touch_rows(episode: Episode) -> Index:
+    """Contact rows with each touch once: a touch between two agents stands in two rows of an Episode.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Indices of contact rows, ascending; of the two rows the one with the smaller agent index.
+    """
+    once = (episode.contact_partner_kind == Partner.PEDESTRIAN) | (episode.contact_agent < episode.contact_partner)
+    return np.flatnonzero(once)
+
+
+def partner_person(episode: Episode, rows: Index) -> Index:
+    """Ids of the people the partners are, or replace.
+
+    Args:
+        episode: The record.
+        rows: (k,) contact rows.
+
+    Returns:
+        Shape (k,).
+    """
+    result = np.zeros(len(rows), dtype=np.int64)
+    for kind, ids in ((Partner.PEDESTRIAN, episode.pedestrian_person), (Partner.AGENT, episode.agent_person)):
+        here = episode.contact_partner_kind[rows] == kind
+        result[here] = ids[episode.contact_partner[rows][here]]
+    return result
+
+
+def partner_words(episode: Episode, rows: Index) -> list[str]:
+    """Kinds of the partners: "person" or "robot".
+
+    Args:
+        episode: The record.
+        rows: (k,) contact rows.
+
+    Returns:
+        k words.
+    """
+    kinds = episode.contact_partner_kind[rows]
+    return ["person" if kind == Partner.PEDESTRIAN else "robot" for kind in kinds]
+
+
+def severities(episode: Episode, rows: Index) -> list[str]:
+    """Closing speed and peak force, the latter where there was physics.
+
+    Args:
+        episode: The record.
+        rows: (k,) contact rows.
+
+    Returns:
+        k texts such as "0.82 m/s, 154 N".
+    """
+    speeds, forces = episode.contact_closing_speed[rows].tolist(), episode.contact_peak_force[rows].tolist()
+    return [
+        f"{speed:.2f} m/s" + (f", {force:.0f} N" if np.isfinite(force) else "")
+        for speed, force in zip(speeds, forces, strict=True)
+    ]
+
+
+def events(episode: Episode) -> list[tuple[float, str, str]]:
+    """The story of an episode: late spawns, touches and ends.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        (time [s], level, text), in order of time. Touches have level ERROR, delays and failures WARN, arrivals INFO.
+    """
+    rows = touch_rows(episode)
+    partners = zip(partner_words(episode, rows), partner_person(episode, rows).tolist(), strict=True)
+    robots = episode.agent_person[episode.contact_agent[rows]].tolist()
+    result = [
+        (time, "ERROR", f"robot {robot} and {kind} {person} touch: {severity}")
+        for time, robot, (kind, person), severity in zip(
+            episode.contact_time[rows].tolist(), robots, partners, severities(episode, rows), strict=True
+        )
+    ]
+    for person, outcome, appear, spawn, end in zip(
+        episode.agent_person.tolist(),
+        episode.agent_outcome.tolist(),
+        episode.agent_appear_time.tolist(),
+        episode.agent_spawn_time.tolist(),
+        episode.agent_end_time.tolist(),
+        strict=True,
+    ):
+        if outcome == Outcome.NEVER_SPAWNED:
+            result.append((float(episode.time[-1]), "WARN", f"robot {person} never spawned: its place was never free"))
+            continue
+        if spawn - appear > 1e-9:
+            result.append((spawn, "WARN", f"robot {person} spawned {spawn - appear:.1f} s late"))
+        level = "INFO" if outcome == Outcome.ARRIVED else "WARN"
+        what = Outcome(outcome).name.lower().replace("_", " ")
+        result.append((end, level, f"robot {person} {what} after {end - spawn:.1f} s"))
+    return sorted(result)
