@@ -17,7 +17,8 @@ from socialnav_mj.geometry import Array
 from socialnav_mj.recordings import Recording
 from socialnav_mj.task import CrowdTask
 
-_PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "scipy")
+PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "scipy")
+"""Whose versions travel in every result."""
 _PROGRESS_PERIOD = 25
 
 
@@ -257,7 +258,7 @@ def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> d
             "checksum": recording.checksum,
             "frame_rate": recording.frame_rate,
         },
-        "versions": package_versions(_PACKAGES),
+        "versions": package_versions(PACKAGES),
     }
 
 

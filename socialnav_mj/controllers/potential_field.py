@@ -14,21 +14,30 @@ MINIMUM_TURN = 1e-3
 """Least turn that eq 7 divides by, as a share of pi; below pi times this the speed is at its limit anyway."""
 
 
-def attractive_force(goal: Array, velocity: Array, *, position_gain: float, velocity_gain: float) -> Array:
+def attractive_force(
+    goal: Array, velocity: Array, *, position_gain: float, velocity_gain: float, limit: float | None
+) -> Array:
     """Pull towards the goal, damped (paper eq 3: -k_p (x - x_goal) - k_v dx/dt).
 
-    The second x of the printed equation is the velocity, as the text below it says.
+    The second x of the printed equation is the velocity, as the text below it says. The limit bounds the pull, not the
+    damping: bounding their sum instead takes the damping away, since the pull of a far goal drowns it, and agents then
+    touch each other three times as often.
 
     Args:
         goal: From the agent to its goal, shape (n_agents, 2) [m].
         velocity: The agent's own, in the same frame, shape (n_agents, 2) [m/s].
         position_gain: k_p.
         velocity_gain: k_v.
+        limit: Largest size of the pull; None for the equation as printed.
 
     Returns:
         Shape (n_agents, 2).
     """
-    return position_gain * goal - velocity_gain * velocity
+    pull = position_gain * goal
+    if limit is not None:
+        size = np.linalg.norm(pull, axis=1, keepdims=True)
+        pull = pull * np.minimum(1.0, limit / np.maximum(size, 1e-9))
+    return pull - velocity_gain * velocity
 
 
 def repulsive_force(obstacle: Array, present: NDArray[np.bool_], *, gain: float, influence_distance: float) -> Array:
@@ -78,7 +87,7 @@ class PotentialField(TwistController):
     """Attraction to the goal and repulsion from everybody near, pedestrians and agents alike.
 
     The paper names no gains. With eq 3 as printed the attraction grows with the distance to the goal, 10 N at 10 m, and
-    swamps the repulsion; capped at 1 it is clearly better, so that is the default, and `attraction_limit=None` gives
+    swamps the repulsion; with the pull capped at 1 it is clearly better, so that is the default, and `attraction_limit=None` gives
     the equations as printed. The paper names no unit of time for the change of heading: it is made in one control step
     as far as the yaw rate allows.
     """
@@ -92,7 +101,7 @@ class PotentialField(TwistController):
     influence_distance: float = 2.0
     """rho_0 [m]."""
     attraction_limit: float | None = 1.0
-    """Largest size of the attractive force; None for eq 3 as printed."""
+    """Largest size of the pull towards the goal; None for eq 3 as printed."""
     name: str = "potential_field"
 
     def __post_init__(self) -> None:
@@ -114,20 +123,21 @@ class PotentialField(TwistController):
         """
         velocity = np.zeros_like(observation["goal"])
         velocity[:, 0] = observation["twist"][:, 0]
-        attraction = attractive_force(
-            observation["goal"], velocity, position_gain=self.position_gain, velocity_gain=self.velocity_gain
+        force = attractive_force(
+            observation["goal"],
+            velocity,
+            position_gain=self.position_gain,
+            velocity_gain=self.velocity_gain,
+            limit=self.attraction_limit,
         )
-        if self.attraction_limit is not None:
-            size = np.linalg.norm(attraction, axis=1, keepdims=True)
-            attraction = attraction * np.minimum(1.0, self.attraction_limit / np.maximum(size, 1e-9))
         for kind in ("pedestrian", "agent"):
-            attraction = attraction + repulsive_force(
+            force = force + repulsive_force(
                 observation[f"{kind}_position"],
                 observation[f"{kind}_mask"],
                 gain=self.repulsion_gain,
                 influence_distance=self.influence_distance,
             )
-        return attraction
+        return force
 
     def twist(self, observation: Observation) -> Array:
         """Speed and yaw rate along the total force.

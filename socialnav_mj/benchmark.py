@@ -1,0 +1,136 @@
+"""What an episode costs beside the bare physics: measured side by side in one run, as ratios."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from time import process_time
+from typing import Any
+
+import mujoco
+import numpy as np
+from dm_control.rl import control
+
+import tasks
+from socialnav_mj.controllers import Limits, make_controller
+from socialnav_mj.physics import Physics
+from socialnav_mj.recordings import Recording
+from socialnav_mj.rollout import rollout
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """Median CPU times of one scenario, and their ratios within each repetition."""
+
+    scenario: str
+    n_agents: int
+    simulated_time: float
+    """[s]"""
+    episode_cpu: float
+    """From reset to the finished `Episode`: physics, contacts, observation, controller, record [s]."""
+    physics_cpu: float
+    """Bare `mj_step` calls on the same model, from the same states [s]."""
+    ratio: float
+    """episode_cpu / physics_cpu, the median over repetitions."""
+    ratio_low: float
+    """The least of them."""
+    ratio_high: float
+    """The greatest."""
+    real_time_factor: float
+    """simulated_time / episode_cpu."""
+    save_share: float
+    """CPU time of saving the episode / episode_cpu."""
+    trace_share: float
+    """CPU time of writing the trace / episode_cpu, without importing rerun."""
+    trace_megabytes: float
+    """Size of the trace."""
+
+
+def measure(recording: Recording, scenario: str, *, controller: str, seed: int = 0, repetitions: int = 3) -> Cost:
+    """Cost of one scenario on one core.
+
+    Bare steps are taken from the episode's own states: before each control step the state, the commands and the slots'
+    contacts are set as they were, and only the `mj_step` calls are timed.
+
+    Args:
+        recording: The crowd.
+        scenario: Name of a task.
+        controller: As `make_controller` takes it.
+        seed: Of the draw.
+        repetitions: Episodes and bare runs, in turn.
+
+    Returns:
+        The cost.
+    """
+    from socialnav_mj.analysis.trace import write_trace  # rerun is slow to import and not needed elsewhere
+
+    environment = tasks.load(scenario, {"dataset": recording, "seed": seed})
+    states = _record_states(environment, controller)
+    episode_times, physics_times, save_times, trace_times = [], [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        trace = Path(folder) / "trace.rrd"
+        write_trace(rollout(environment, make_controller(controller)), trace)  # warms everything up
+        for _ in range(repetitions):
+            begin = process_time()
+            episode = rollout(environment, make_controller(controller), scenario_name=scenario)
+            episode_times.append(process_time() - begin)
+            physics_times.append(_time_bare_steps(environment, states))
+            begin = process_time()
+            episode.save(Path(folder) / "episode.npz")
+            save_times.append(process_time() - begin)
+            begin = process_time()
+            write_trace(episode, trace)
+            trace_times.append(process_time() - begin)
+        size = trace.stat().st_size / 1e6
+    ratios = [e / p for e, p in zip(episode_times, physics_times, strict=True)]
+    return Cost(
+        scenario=scenario,
+        n_agents=episode.n_agents,
+        simulated_time=float(episode.time[-1]),
+        episode_cpu=median(episode_times),
+        physics_cpu=median(physics_times),
+        ratio=median(ratios),
+        ratio_low=min(ratios),
+        ratio_high=max(ratios),
+        real_time_factor=float(episode.time[-1]) / median(episode_times),
+        save_share=median(s / e for s, e in zip(save_times, episode_times, strict=True)),
+        trace_share=median(t / e for t, e in zip(trace_times, episode_times, strict=True)),
+        trace_megabytes=size,
+    )
+
+
+_DATA_FIELDS = ("qpos", "qvel", "qacc_warmstart", "ctrl", "mocap_pos", "mocap_quat")
+_MODEL_FIELDS = ("geom_contype", "geom_conaffinity", "body_gravcomp")
+
+
+def _record_states(environment: control.Environment, controller_name: str) -> list[dict[str, Any]]:
+    """What distinguishes the control steps of an episode, copied just before the physics of each."""
+    physics: Physics = environment.physics
+    controller = make_controller(controller_name)
+    controller.reset(Limits.of(environment.task.scenario), seed=environment.task.scenario.seed)
+    states = []
+    time_step = environment.reset()
+    while not time_step.last():
+        action = controller.act(time_step.observation)
+        state = {name: getattr(physics.data.ptr, name).copy() for name in _DATA_FIELDS}
+        state |= {name: getattr(physics.model.ptr, name).copy() for name in _MODEL_FIELDS}
+        time_step = environment.step(action)
+        state["ctrl"] = physics.data.ctrl.copy()
+        states.append(state)
+    return states
+
+
+def _time_bare_steps(environment: control.Environment, states: list[dict[str, Any]]) -> float:
+    physics: Physics = environment.physics
+    model, data = physics.model.ptr, physics.data.ptr
+    n_sub_steps = environment.task.scenario.n_sub_steps
+    total = 0.0
+    for state in states:
+        for name in _DATA_FIELDS:
+            np.copyto(getattr(data, name), state[name])
+        for name in _MODEL_FIELDS:
+            np.copyto(getattr(model, name), state[name])
+        begin = process_time()
+        mujoco.mj_step(model, data, n_sub_steps)
+        total += process_time() - begin
+    return total

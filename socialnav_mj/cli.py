@@ -1,0 +1,322 @@
+"""The command `socialnav-mj`: sub-commands, and nothing that another module could do."""
+
+import json
+import shlex
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from dm_control.rl.control import PhysicsError
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
+
+_console = Console()
+_errors = Console(stderr=True)
+
+Scenarios = Annotated[tuple[Literal[1, 2, 3, 4], ...], tyro.conf.arg(metavar="{1,2,3,4}")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate:
+    """Run scenarios with controllers, score them beside the recorded people, and write tables and traces.
+
+    Run again after an interruption, the same command goes on where it was.
+    """
+
+    dataset: str = "plaza"
+    """Name in the catalogue (see `list`), or path of a recording's file or folder."""
+    variant: str | None = None
+    """Which annotation of the recording (see `data list`); the first by default."""
+    data_dir: Path | None = None
+    """Where recordings are looked for first; then in $SOCIALNAV_MJ_DATA, then in the user cache."""
+    scenarios: Scenarios = (1, 2, 3, 4)
+    """Scenarios that replace 10, 30, 70, 90 % of the people."""
+    controllers: tuple[str, ...] = ("potential_field", "go_straight")
+    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(attraction_limit=None)'."""
+    draws: int = 3
+    """Random choices of the replaced people; 10 or more for figures to publish."""
+    seed: int = 0
+    """Seed of the first draw; the others count up from it."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path | None = None
+    """Folder of the results; runs/DATASET by default."""
+    robot_radius: float = Robot.radius
+    """[m]"""
+    pedestrian_radius: float = Scenario.pedestrian_radius
+    """[m]"""
+    turn_limit: TurnLimit = Scenario.turn_limit
+    """Reading of the paper's pi/6: a turn per control step, or rad/s."""
+    on_collision: OnCollision = Scenario.on_collision
+    """What an agent does after a collision; its success is void either way."""
+    control_timestep: float = Scenario.control_timestep
+    """Time between two actions [s]."""
+
+    def run(self) -> None:
+        """Evaluate, then report."""
+        from socialnav_mj.analysis.report import write_report
+        from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
+
+        names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
+        evaluation = Evaluation(
+            dataset=self.dataset,
+            variant=self.variant,
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            controllers=self.controllers,
+            draws=self.draws,
+            seed=self.seed,
+            task_kwargs={name: getattr(self, name) for name in names},
+        )
+        out = self.out or Path("runs") / Path(self.dataset).stem
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=_errors) as progress:
+            bar = progress.add_task("episodes", total=len(jobs_of(evaluation)), rate="")
+            simulated = 0.0
+            for done in evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs):
+                simulated += done.simulated_time
+                elapsed = progress.tasks[0].elapsed or 0.0
+                rate = f"{simulated / elapsed:.0f} x real time" if simulated and elapsed else ""
+                progress.update(bar, advance=1, rate=rate)
+                if done.error is not None:
+                    progress.console.print(f"{done.job.file_name}: {done.error}", style="red", markup=False)
+        with _errors.status("tables and traces"):
+            report = write_report(out, console=_console, n_jobs=self.jobs)
+        _console.print(f"report: {report}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)", markup=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Make the tables, the report and the traces of a run again from its episodes."""
+
+    folder: tyro.conf.Positional[Path]
+    """Of `evaluate`."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+
+    def run(self) -> None:
+        """Report."""
+        from socialnav_mj.analysis.report import write_report
+
+        path = write_report(self.folder, console=_console, n_jobs=self.jobs)
+        _console.print(f"report: {path}", markup=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """Show the tasks, controllers and recordings that there are."""
+
+    def run(self) -> None:
+        """Print three tables."""
+        import tasks
+        from socialnav_mj.controllers import available
+        from socialnav_mj.recordings.catalogue import catalogue
+
+        table = Table("task", "replaced", title="tasks", title_justify="left")
+        for name in tasks.ALL_TASKS:
+            table.add_row(name, f"{tasks.SHARES[name]:.0%}")
+        _console.print(table)
+        table = Table("controller", title="controllers", title_justify="left")
+        for name in available():
+            table.add_row(name)
+        table.add_row("package.module:Class")
+        _console.print(table)
+        table = Table("recording", "variants", "what it is", title="recordings", title_justify="left")
+        for name, row in catalogue().items():
+            table.add_row(name, ", ".join(row.variants), row.title)
+        _console.print(table)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataList:
+    """Known recordings: source, licence, checksums, frame rate, scale, and whether they are on this machine."""
+
+    data_dir: Path | None = None
+    """Where recordings are looked for first."""
+
+    def run(self) -> None:
+        """Print the catalogue."""
+        from socialnav_mj.recordings.catalogue import catalogue, load_recording
+
+        for name, row in catalogue().items():
+            table = Table(show_header=False, title=f"{name}: {row.title}", title_justify="left")
+            for label in ("source", "licence", "scale"):
+                table.add_row(label, getattr(row, label))
+            table.add_row("frame rate", f"{row.frame_rate:g} Hz")
+            for variant, files in row.variants.items():
+                for file, checksum in files.items():
+                    table.add_row(f"{variant}: {file}", f"sha256 {checksum}")
+            try:
+                load_recording(name, data_dir=self.data_dir)
+                table.add_row("here", "yes")
+            except FileNotFoundError:
+                table.add_row("here", f"no: socialnav-mj data fetch {name}")
+            _console.print(table)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataInfo:
+    """Facts of a recording: people, concurrency, speeds, distances, and who comes how near."""
+
+    name: tyro.conf.Positional[str]
+    """Name in the catalogue, or path of a recording."""
+    variant: str | None = None
+    """Which annotation; the first by default."""
+    data_dir: Path | None = None
+    """Where recordings are looked for first."""
+
+    def run(self) -> None:
+        """Print the facts."""
+        from rich.markdown import Markdown
+
+        from socialnav_mj.recordings import load_recording
+        from socialnav_mj.recordings.facts import facts, facts_table
+
+        recording = load_recording(self.name, variant=self.variant, data_dir=self.data_dir)
+        _console.print(Markdown(facts_table({recording.name: facts(recording)})))
+        _console.print(f"variant {recording.variant}, checksum {recording.checksum}", markup=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataFetch:
+    """Download a recording from its public source and verify its checksum."""
+
+    name: tyro.conf.Positional[str]
+    """Name in the catalogue."""
+    data_dir: Path | None = None
+    """Where to put it; $SOCIALNAV_MJ_DATA, or the user cache, by default."""
+
+    def run(self) -> None:
+        """Download."""
+        from socialnav_mj.recordings.fetch import fetch
+
+        for path in fetch(self.name, data_dir=self.data_dir):
+            _console.print(str(path), markup=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Data:
+    """Recordings: list, info, fetch."""
+
+    action: tyro.conf.OmitSubcommandPrefixes[
+        Annotated[DataList, tyro.conf.subcommand("list")]
+        | Annotated[DataInfo, tyro.conf.subcommand("info")]
+        | Annotated[DataFetch, tyro.conf.subcommand("fetch")]
+    ]
+
+    def run(self) -> None:
+        """Do what was asked for."""
+        self.action.run()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Measure what episodes cost on one core, beside bare `mj_step` calls, as ratios."""
+
+    dataset: str = "plaza"
+    """Name in the catalogue, or path of a recording."""
+    data_dir: Path | None = None
+    """Where recordings are looked for first."""
+    scenarios: Scenarios = (1, 4)
+    """Scenarios to measure."""
+    controller: str = "potential_field"
+    """See `evaluate`."""
+    seed: int = 0
+    """Seed of the draw."""
+    repetitions: int = 3
+    """Episodes and bare runs, in turn; the median is shown."""
+    out: Path | None = None
+    """JSON file to write, with package versions and the recording's checksum."""
+
+    def run(self) -> None:
+        """Measure and print."""
+        from socialnav_mj.benchmark import measure
+        from socialnav_mj.files import write_whole
+        from socialnav_mj.recordings import load_recording
+        from socialnav_mj.rollout import PACKAGES, package_versions
+
+        recording = load_recording(self.dataset, data_dir=self.data_dir)
+        costs = []
+        for number in self.scenarios:
+            with _errors.status(f"scenario {number}"):
+                cost = measure(
+                    recording,
+                    f"scenario_{number}",
+                    controller=self.controller,
+                    seed=self.seed,
+                    repetitions=self.repetitions,
+                )
+            costs.append(cost)
+        table = Table(title=f"{recording.name}, {self.controller}, CPU time on one core", title_justify="left")
+        table.add_column("")
+        rows: dict[str, list[str]] = {}
+        for cost in costs:
+            table.add_column(cost.scenario, justify="right")
+            for label, text in {
+                "agents": f"{cost.n_agents}",
+                "simulated [s]": f"{cost.simulated_time:.1f}",
+                "episode CPU [s]": f"{cost.episode_cpu:.2f}",
+                "bare mj_step CPU [s]": f"{cost.physics_cpu:.2f}",
+                "episode / mj_step": f"{cost.ratio:.2f} ({cost.ratio_low:.2f} to {cost.ratio_high:.2f})",
+                "real-time factor": f"{cost.real_time_factor:.1f}",
+                "saving / episode": f"{cost.save_share:.1%}",
+                "trace / episode": f"{cost.trace_share:.1%}",
+                "trace [MB]": f"{cost.trace_megabytes:.2f}",
+            }.items():
+                rows.setdefault(label, []).append(text)
+        for label, cells in rows.items():
+            table.add_row(label, *cells)
+        _console.print(table)
+        if self.out is not None:
+            content = {
+                "command": shlex.join(sys.argv),
+                "recording": {"name": recording.name, "variant": recording.variant, "checksum": recording.checksum},
+                "versions": package_versions(PACKAGES),
+                "costs": [asdict(cost) for cost in costs],
+            }
+            write_whole(self.out, (json.dumps(content, indent=1) + "\n").encode())
+
+
+Command = (
+    Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[List, tyro.conf.subcommand("list")]
+    | Annotated[Data, tyro.conf.subcommand("data")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Entry point; bad input ends in one clear message and exit code 2, an interruption in 130.
+
+    Args:
+        args: Command line without the program's name; sys.argv by default.
+    """
+    command = tyro.cli(
+        Command,  # type: ignore[arg-type]
+        prog="socialnav-mj",
+        description="Social navigation in recorded crowds, as a MuJoCo physics benchmark.",
+        args=args,
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
+    )
+    try:
+        command.run()
+    except KeyboardInterrupt:
+        _errors.print("interrupted; the same command goes on where it was", markup=False)
+        sys.exit(130)
+    except (ValueError, OSError, RuntimeError, PhysicsError) as error:
+        _errors.print(f"error: {error}", style="red", markup=False)
+        sys.exit(2)
