@@ -30,7 +30,7 @@ def load(
 
 
 def _choose_renderer() -> None:
-    """Without a display dm_control's own choice, GLFW, cannot render: name a library that can, before it is imported."""
+    """Without a display dm_control's own choice, GLFW, cannot render: name a library that can before its import."""
     if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
         return
     for renderer, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):

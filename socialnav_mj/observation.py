@@ -18,6 +18,8 @@ Keys of an observation, for n slots of agents and m slots of pedestrians:
 | agent_mask | (n, n) bool | the other agent is there and is not oneself |
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ def observe(
     pedestrian_position: Array,
     pedestrian_velocity: Array,
     pedestrian_present: NDArray[np.bool_],
-) -> dict[str, NDArray]:
+) -> dict[str, NDArray[Any]]:
     """Observation of every agent slot.
 
     Args:
@@ -56,7 +58,7 @@ def observe(
     """
     n, m = len(active), len(pedestrian_present)
     rows, columns = np.flatnonzero(active), np.flatnonzero(pedestrian_present)
-    result: dict[str, NDArray] = {
+    result: dict[str, NDArray[Any]] = {
         "active": active.copy(),
         "person": np.where(active, person, -1),
         "position": np.zeros((n, 2)),

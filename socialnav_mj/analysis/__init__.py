@@ -1,0 +1,1 @@
+"""What is made of episodes: statistics, tables, the report and the trace."""

@@ -33,9 +33,10 @@ def make_controller(spec: str) -> Controller:
     """A controller by name, with its configuration if need be.
 
     Args:
-        spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class"; keyword
-            arguments of literals may follow, as in "potential_field(attraction_limit=None)". With them a dataclass
-            with a field `name` is named by the whole spec, so that two configurations can stand in one table.
+        spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class";
+            keyword arguments of literals may follow, as in "potential_field(attraction_limit=None)". With them a
+            dataclass with a field `name` is named by the whole spec, so that two configurations can stand in one
+            table.
 
     Returns:
         The controller.
