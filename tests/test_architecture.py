@@ -25,17 +25,17 @@ ROWS = (
     {"metrics"},
     {"analysis"},
     {"learning"},
-    {"cli"},
+    {"benchmark", "cli"},
 )
 # Controllers own no simulator: most rows above are closed to them.
 CONTROLLERS_MAY_IMPORT = {"resources", "geometry", "config", "observation", "controllers"}
 # `socialnav_mj.load` imports `tasks` when it is called.
 EXCEPTIONS = {("socialnav_mj", "tasks")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
-# dm_control's Environment in their signatures.
+# dm_control's Environment in their signatures, `benchmark` times bare mj_step calls, `cli` reports PhysicsError.
 ONLY_IN = {
-    "mujoco": {"scene", "physics", "task", "environment", "tasks"},
-    "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "socialnav_mj"},
+    "mujoco": {"scene", "physics", "task", "environment", "tasks", "benchmark"},
+    "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "benchmark", "cli", "socialnav_mj"},
     "matplotlib": {"analysis"},
     "rerun": {"analysis"},
     "torch": {"learning"},
