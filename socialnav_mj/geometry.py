@@ -41,11 +41,10 @@ def to_agent_frame(vector: ArrayLike, heading: ArrayLike) -> Array:
     Returns:
         The vectors' components ahead of and to the left of the agent, shape (..., 2).
     """
-    vector = np.asarray(vector, dtype=float)
-    heading = np.asarray(heading, dtype=float)
-    cos, sin = np.cos(heading), np.sin(heading)
-    x, y = vector[..., 0], vector[..., 1]
-    return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
+    # One complex product instead of four real ones: this is called for every pair of bodies at every control step.
+    plane = np.ascontiguousarray(vector, dtype=float).view(complex)[..., 0]
+    turned: Array = (plane * np.exp(-1j * np.asarray(heading, dtype=float)))[..., None].view(float)
+    return turned
 
 
 def yaw_of_quaternion(quaternion: ArrayLike) -> Array:
@@ -58,7 +57,7 @@ def yaw_of_quaternion(quaternion: ArrayLike) -> Array:
         Shape (...), in [-pi, pi] [rad].
     """
     quaternion = np.asarray(quaternion, dtype=float)
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    w, x, y, z = quaternion[..., 0], quaternion[..., 1], quaternion[..., 2], quaternion[..., 3]
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 

@@ -88,7 +88,8 @@ class Physics(MujocoPhysics):
         root = np.asarray(model.body_rootid)
         robots = np.array([model.body(agent_name(i) + "robot").id for i in range(self.n_agents)])
         people = np.array([model.body(pedestrian_name(i) + "pedestrian").id for i in range(self.n_pedestrians)])
-        self._mocap = np.asarray(model.body_mocapid)[people]
+        if not np.array_equal(model.body_mocapid[people], np.arange(model.nmocap)) or model.geom("floor").id != 0:
+            raise ValueError("the scene must have the floor as its first geom and the pedestrians as its mocap bodies")
         self._agent_bodies = [np.flatnonzero(root == body) for body in robots]
         self._agent_geoms = [np.flatnonzero(root[model.geom_bodyid] == body) for body in robots]
         self._agent_dofs = [np.flatnonzero(root[model.dof_bodyid] == body) for body in robots]
@@ -227,9 +228,9 @@ class Physics(MujocoPhysics):
         """
         absent = np.isnan(position[:, 0])
         parked = np.stack([2.0 * np.arange(self.n_pedestrians), np.full(self.n_pedestrians, 2.0)], axis=1)
-        self.data.mocap_pos[self._mocap, :2] = np.where(absent[:, None], parked, position)
-        self.data.mocap_pos[self._mocap, 2] = np.where(absent, -_PARKING_DEPTH, 0.0)
-        self.data.mocap_quat[self._mocap] = quaternion_of_yaw(np.where(absent, 0.0, heading))
+        self.data.mocap_pos[:, :2] = np.where(absent[:, None], parked, position)
+        self.data.mocap_pos[:, 2] = np.where(absent, -_PARKING_DEPTH, 0.0)
+        self.data.mocap_quat[:] = quaternion_of_yaw(np.where(absent, 0.0, heading))
 
     def set_pedestrian_path(self, position: Array, velocity: Array) -> None:
         """Say how people move during the next call of `step`.
@@ -271,23 +272,20 @@ class Physics(MujocoPhysics):
             PhysicsError: If the state became invalid; names the time and the robot.
         """
         model, data = self.model.ptr, self.data.ptr
-        qvel, before, mocap_pos, owner = data.qvel, self._velocity_before, data.mocap_pos, self._owner
-        rows = self._present_rows(nstep)
-        path, velocity, mocap = self._path, self._path_velocity, None
-        if path is not None:
-            mocap, path = self._mocap[rows], path[:, rows]
+        qvel, before, contact = data.qvel, self._velocity_before, data.contact
+        people = data.mocap_pos[:, :2]
+        path = self._filled_path(people, nstep)
         try:
             with self.check_invalid_state():
                 for k in range(nstep):
                     if path is not None:
-                        mocap_pos[mocap, :2] = path[k]
+                        np.copyto(people, path[k])
                     np.copyto(before, qvel)
                     time = data.time
                     mujoco.mj_step(model, data)
-                    pairs = owner[data.contact.geom]
-                    touching = np.flatnonzero(pairs.min(axis=1) >= 0) if len(pairs) else ()
-                    if len(touching):
-                        self._note_touches(time, pairs, touching, None if velocity is None else velocity[k])
+                    # The floor is geom 0, and MuJoCo names it first: all else is a touch of two bodies.
+                    if contact.geom1.any():
+                        self._note_touches(time, None if self._path_velocity is None else self._path_velocity[k])
         except PhysicsError as error:
             raise PhysicsError(f"at {data.time:.2f} s: {error}{self._culprit()}") from error
         self._path = self._path_velocity = None
@@ -297,12 +295,13 @@ class Physics(MujocoPhysics):
         mujoco.mj_kinematics(self.model.ptr, self.data.ptr)
         mujoco.mj_camlight(self.model.ptr, self.data.ptr)
 
-    def _present_rows(self, nstep: int) -> IntArray:
+    def _filled_path(self, people: Array, nstep: int) -> Array | None:
+        """Positions of all mocap bodies at every physics step; those who are not in the scene stay where they are."""
         if self._path is None:
-            return np.zeros(0, dtype=np.int64)
+            return None
         if len(self._path) != nstep:
             raise ValueError(f"the pedestrians' path has {len(self._path)} positions for {nstep} physics steps")
-        return np.flatnonzero(~np.isnan(self._path[0, :, 0]))
+        return np.where(np.isnan(self._path), people, self._path)
 
     def _culprit(self) -> str:
         bad = ~np.isfinite(self.data.qvel) | (np.abs(self.data.qvel) > 1e6)
@@ -322,7 +321,9 @@ class Physics(MujocoPhysics):
         touches, self._new_touches = self._new_touches, []
         return touches
 
-    def _note_touches(self, time: float, pairs: IntArray, touching: IntArray, path_velocity: Array | None) -> None:
+    def _note_touches(self, time: float, path_velocity: Array | None) -> None:
+        pairs = self._owner[self.data.contact.geom]
+        touching = np.flatnonzero(pairs.min(axis=1) >= 0)
         timestep = self.model.opt.timestep
         forces: dict[tuple[int, int], float] = {}
         for i in touching:
@@ -354,7 +355,7 @@ class Physics(MujocoPhysics):
             partner_velocity = self._velocity_before[self._qvel[partner] : self._qvel[partner] + 2].copy()
         else:
             kind, partner = Partner.PEDESTRIAN, other - self.n_agents
-            partner_heading = float(yaw_of_quaternion(self.data.mocap_quat[self._mocap[partner]]))
+            partner_heading = float(yaw_of_quaternion(self.data.mocap_quat[partner]))
             partner_velocity = np.zeros(2) if path_velocity is None else path_velocity[partner].copy()
         return Touch(
             agent=agent,

@@ -343,12 +343,12 @@ class CrowdTask(base.Task):
             np.isin(slots, struck) if self.scenario.on_collision == "retire" else np.zeros(len(slots), dtype=bool)
         )
         self._reward[slots[arrived & ~taken_out]] += ARRIVAL_REWARD
-        outcome = np.select(
-            [taken_out, arrived, late], [Outcome.COLLIDED, Outcome.ARRIVED, Outcome.TIMED_OUT], _UNDER_WAY
-        )
-        for slot, agent, result in zip(slots, agents, outcome, strict=True):
-            if result != _UNDER_WAY:
-                self.outcome[agent] = result
-                self.end_step[agent] = self.step
-                self._slot_agent[slot] = NOBODY
-                physics.park_agent(int(slot))
+        for row in np.flatnonzero(taken_out | arrived | late):
+            slot, agent = int(slots[row]), int(agents[row])
+            if taken_out[row]:
+                self.outcome[agent] = Outcome.COLLIDED
+            else:
+                self.outcome[agent] = Outcome.ARRIVED if arrived[row] else Outcome.TIMED_OUT
+            self.end_step[agent] = self.step
+            self._slot_agent[slot] = NOBODY
+            physics.park_agent(slot)
