@@ -306,7 +306,7 @@ def main(args: list[str] | None = None) -> None:
         args: Command line without the program's name; sys.argv by default.
     """
     command = tyro.cli(
-        Command,  # type: ignore[arg-type]
+        Command,
         prog="socialnav-mj",
         description="Social navigation in recorded crowds, as a MuJoCo physics benchmark.",
         args=args,

@@ -164,7 +164,7 @@ def _run(job: Job, folder: Path) -> Done:
         else:
             episode = rollout(environment, make_controller(job.controller), scenario_name=job.scenario)
         episode.save(folder / job.file_name)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001  whatever it is, it is told and the other episodes go on
         return Done(job=job, simulated_time=0.0, error=f"{type(error).__name__}: {error}")
     return Done(job=job, simulated_time=float(episode.time[-1]))
 

@@ -9,7 +9,7 @@ import numpy as np
 from dm_control.rl import control
 from numpy.typing import NDArray
 
-from socialnav_mj.cast import NOBODY, Cast, cast_recording
+from socialnav_mj.cast import NOBODY, Cast
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller, Limits, controller_config
 from socialnav_mj.episode import Episode, Outcome, Partner
@@ -145,13 +145,25 @@ class _Recorder:
             touch = collision.touch
             shared = (touch.last_time - touch.time + step, touch.position, touch.impulse, touch.peak_force)
             sides = [
-                (collision.agent, collision.partner, touch.normal, touch.agent_heading)
-                + (touch.agent_velocity, touch.partner_velocity)
+                (
+                    collision.agent,
+                    collision.partner,
+                    touch.normal,
+                    touch.agent_heading,
+                    touch.agent_velocity,
+                    touch.partner_velocity,
+                )
             ]
             if touch.kind == Partner.AGENT:
                 sides.append(
-                    (collision.partner, collision.agent, -touch.normal, touch.partner_heading)
-                    + (touch.partner_velocity, touch.agent_velocity)
+                    (
+                        collision.partner,
+                        collision.agent,
+                        -touch.normal,
+                        touch.partner_heading,
+                        touch.partner_velocity,
+                        touch.agent_velocity,
+                    )
                 )
             rows += [(touch.time, agent, int(touch.kind), partner, *rest, *shared) for agent, partner, *rest in sides]
         return contact_columns(rows)

@@ -87,9 +87,9 @@ class PotentialField(TwistController):
     """Attraction to the goal and repulsion from everybody near, pedestrians and agents alike.
 
     The paper names no gains. With eq 3 as printed the attraction grows with the distance to the goal, 10 N at 10 m, and
-    swamps the repulsion; with the pull capped at 1 it is clearly better, so that is the default, and `attraction_limit=None` gives
-    the equations as printed. The paper names no unit of time for the change of heading: it is made in one control step
-    as far as the yaw rate allows.
+    swamps the repulsion; with the pull capped at 1 it is clearly better, so that is the default, and
+    `attraction_limit=None` gives the equations as printed. The paper names no unit of time for the change of heading:
+    it is made in one control step as far as the yaw rate allows.
     """
 
     position_gain: float = 1.0
