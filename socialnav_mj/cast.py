@@ -7,7 +7,7 @@ import numpy as np
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import IntArray
-from socialnav_mj.geometry import Array
+from socialnav_mj.geometry import Array, quaternion_of_yaw
 from socialnav_mj.recordings import Recording
 from socialnav_mj.recordings.draw import replaced_people
 
@@ -150,6 +150,12 @@ class SlotCrowd:
     """(n_slots, 2) [m/s]."""
     heading: Array
     """(n_slots,) [rad]."""
+    quaternion: Array
+    """(n_slots, 4) of the heading, (w, x, y, z)."""
+    present: IntArray
+    """Slots that are not empty, shape (k,)."""
+    changed: IntArray
+    """Slots that do not hold whom they held at the step before, shape (k,)."""
 
 
 class Replay:
@@ -182,6 +188,10 @@ class Replay:
             self._pedestrian[first:end, slot] = i
             self._position[fine, slot], self._velocity[fine, slot] = position, velocity
             self._heading[first:end, slot] = heading[::count]
+        self._quaternion = quaternion_of_yaw(self._heading)
+        self._present = [np.flatnonzero(row != NOBODY) for row in self._pedestrian]
+        before = np.concatenate([np.full((1, slots), NOBODY), self._pedestrian[:-1]])
+        self._changed = [np.flatnonzero(row) for row in self._pedestrian != before]
 
     def crowd(self, step: int) -> SlotCrowd:
         """Everybody in the scene at a control step.
@@ -192,12 +202,15 @@ class Replay:
         Returns:
             Views that must not be written to.
         """
-        step = min(step, self._steps)
+        row = min(step, self._steps)
         return SlotCrowd(
-            pedestrian=self._pedestrian[step],
-            position=self._position[step * self._count],
-            velocity=self._velocity[step * self._count],
-            heading=self._heading[step],
+            pedestrian=self._pedestrian[row],
+            position=self._position[row * self._count],
+            velocity=self._velocity[row * self._count],
+            heading=self._heading[row],
+            quaternion=self._quaternion[row],
+            present=self._present[row],
+            changed=self._changed[row] if step == row else self._changed[row][:0],
         )
 
     def motion(self, step: int) -> tuple[Array, Array]:

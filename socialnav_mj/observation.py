@@ -37,7 +37,7 @@ def observe(
     goal: Array,
     pedestrian_position: Array,
     pedestrian_velocity: Array,
-    pedestrian_present: NDArray[np.bool_],
+    pedestrian_slots: NDArray[np.int64],
 ) -> dict[str, NDArray[Any]]:
     """Observation of every agent slot.
 
@@ -51,13 +51,13 @@ def observe(
         goal: (n, 2) world [m].
         pedestrian_position: (m, 2) world [m].
         pedestrian_velocity: (m, 2) world [m/s].
-        pedestrian_present: (m,) which pedestrians are in the scene.
+        pedestrian_slots: (k,) slots of the pedestrians in the scene; the others may hold anything.
 
     Returns:
         The keys, shapes and units of this module's docstring.
     """
-    n, m = len(active), len(pedestrian_present)
-    rows, columns = np.flatnonzero(active), np.flatnonzero(pedestrian_present)
+    n, m = len(active), len(pedestrian_position)
+    rows = np.flatnonzero(active)
     result: dict[str, NDArray[Any]] = {
         "active": active.copy(),
         "person": np.where(active, person, -1),
@@ -67,10 +67,10 @@ def observe(
         "goal": np.zeros((n, 2)),
         "pedestrian_position": np.zeros((n, m, 2)),
         "pedestrian_velocity": np.zeros((n, m, 2)),
-        "pedestrian_mask": active[:, None] & pedestrian_present,
+        "pedestrian_mask": np.zeros((n, m), dtype=bool),
         "agent_position": np.zeros((n, n, 2)),
         "agent_velocity": np.zeros((n, n, 2)),
-        "agent_mask": active[:, None] & active & ~np.eye(n, dtype=bool),
+        "agent_mask": np.zeros((n, n), dtype=bool),
     }
     if not rows.size:
         return result
@@ -81,13 +81,16 @@ def observe(
     result["twist"][rows, 0] = own[:, 0]
     result["twist"][rows, 1] = yaw_rate[rows]
     result["goal"][rows] = to_agent_frame(goal[rows] - here, facing)
-    people = np.ix_(rows, columns)
+    facing = facing[:, None]
+    people = (rows[:, None], pedestrian_slots)
+    result["pedestrian_mask"][people] = True
     result["pedestrian_position"][people] = to_agent_frame(
-        pedestrian_position[columns] - here[:, None], facing[:, None]
+        pedestrian_position[pedestrian_slots] - here[:, None], facing
     )
-    result["pedestrian_velocity"][people] = to_agent_frame(pedestrian_velocity[columns][None], facing[:, None])
-    others = np.ix_(rows, rows)
-    seen = ~np.eye(len(rows), dtype=bool)[..., None]
-    result["agent_position"][others] = to_agent_frame(here - here[:, None], facing[:, None]) * seen
-    result["agent_velocity"][others] = to_agent_frame(moving[None], facing[:, None]) * seen
+    result["pedestrian_velocity"][people] = to_agent_frame(pedestrian_velocity[pedestrian_slots][None], facing)
+    others = (rows[:, None], rows)
+    seen = ~np.eye(len(rows), dtype=bool)
+    result["agent_mask"][others] = seen
+    result["agent_position"][others] = to_agent_frame(here - here[:, None], facing) * seen[..., None]
+    result["agent_velocity"][others] = to_agent_frame(moving[None], facing) * seen[..., None]
     return result

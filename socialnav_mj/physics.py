@@ -102,6 +102,7 @@ class Physics(MujocoPhysics):
         for slot in range(self.n_agents):
             self._owner[model.geom(agent_name(slot) + "bumper").id] = slot
         self._owner[self._pedestrian_geom] = self.n_agents + np.arange(self.n_pedestrians)
+        self._mocap_pos, self._mocap_quat = data.ptr.mocap_pos, data.ptr.mocap_quat
         self._velocity_before = np.zeros(model.nv)
         self._path: Array | None = None
         self._path_velocity: Array | None = None
@@ -119,9 +120,7 @@ class Physics(MujocoPhysics):
         self._path = self._path_velocity = None
         for slot in range(self.n_agents):
             self.park_agent(slot)
-        everybody = np.arange(self.n_pedestrians)
-        self.set_pedestrian_contacts(everybody, np.zeros(self.n_pedestrians, dtype=bool))
-        self.set_pedestrian_pose(np.full((self.n_pedestrians, 2), np.nan), np.zeros(self.n_pedestrians))
+        self.park_pedestrians(np.arange(self.n_pedestrians))
 
     def _forget_touches(self) -> None:
         self._touches: dict[tuple[int, int], Touch] = {}
@@ -219,18 +218,28 @@ class Physics(MujocoPhysics):
 
     # Pedestrians
 
-    def set_pedestrian_pose(self, position: Array, heading: Array) -> None:
-        """Move people at once; those whose position is NaN are put below the floor.
+    def set_pedestrian_pose(self, slots: IntArray, position: Array, quaternion: Array) -> None:
+        """Move people at once.
 
         Args:
-            position: Shape (n_pedestrians, 2) [m].
-            heading: Shape (n_pedestrians,) [rad].
+            slots: Pedestrian slots, shape (k,).
+            position: Shape (k, 2) [m].
+            quaternion: (w, x, y, z), shape (k, 4).
         """
-        absent = np.isnan(position[:, 0])
-        parked = np.stack([2.0 * np.arange(self.n_pedestrians), np.full(self.n_pedestrians, 2.0)], axis=1)
-        self.data.mocap_pos[:, :2] = np.where(absent[:, None], parked, position)
-        self.data.mocap_pos[:, 2] = np.where(absent, -_PARKING_DEPTH, 0.0)
-        self.data.mocap_quat[:] = quaternion_of_yaw(np.where(absent, 0.0, heading))
+        self._mocap_pos[slots, :2] = position
+        self._mocap_pos[slots, 2] = 0.0
+        self._mocap_quat[slots] = quaternion
+
+    def park_pedestrians(self, slots: IntArray) -> None:
+        """Take people out of the scene.
+
+        Args:
+            slots: Pedestrian slots, shape (k,).
+        """
+        self._mocap_pos[slots, 0] = 2.0 * slots
+        self._mocap_pos[slots, 1] = 2.0
+        self._mocap_pos[slots, 2] = -_PARKING_DEPTH
+        self.set_pedestrian_contacts(slots, np.zeros(len(slots), dtype=bool))
 
     def set_pedestrian_path(self, position: Array, velocity: Array) -> None:
         """Say how people move during the next call of `step`.
@@ -273,7 +282,7 @@ class Physics(MujocoPhysics):
         """
         model, data = self.model.ptr, self.data.ptr
         qvel, before, contact = data.qvel, self._velocity_before, data.contact
-        people = data.mocap_pos[:, :2]
+        people = self._mocap_pos[:, :2]
         path = self._filled_path(people, nstep)
         try:
             with self.check_invalid_state():
@@ -284,7 +293,7 @@ class Physics(MujocoPhysics):
                     time = data.time
                     mujoco.mj_step(model, data)
                     # The floor is geom 0, and MuJoCo names it first: all else is a touch of two bodies.
-                    if contact.geom1.any():
+                    if np.count_nonzero(contact.geom1):
                         self._note_touches(time, None if self._path_velocity is None else self._path_velocity[k])
         except PhysicsError as error:
             raise PhysicsError(f"at {data.time:.2f} s: {error}{self._culprit()}") from error
@@ -355,7 +364,7 @@ class Physics(MujocoPhysics):
             partner_velocity = self._velocity_before[self._qvel[partner] : self._qvel[partner] + 2].copy()
         else:
             kind, partner = Partner.PEDESTRIAN, other - self.n_agents
-            partner_heading = float(yaw_of_quaternion(self.data.mocap_quat[partner]))
+            partner_heading = float(yaw_of_quaternion(self._mocap_quat[partner]))
             partner_velocity = np.zeros(2) if path_velocity is None else path_velocity[partner].copy()
         return Touch(
             agent=agent,

@@ -212,7 +212,7 @@ class CrowdTask(base.Task):
                 goal=self.cast.agent_goal[agent],
                 pedestrian_position=people.position,
                 pedestrian_velocity=people.velocity,
-                pedestrian_present=people.pedestrian != NOBODY,
+                pedestrian_slots=people.present,
             )
         )
 
@@ -243,16 +243,15 @@ class CrowdTask(base.Task):
     def _update_pedestrians(self, physics: Physics) -> None:
         """Place people at the current step; whoever appears on a robot stays contact-free until clear of all robots."""
         now = self._replay.crowd(self.step)
-        physics.set_pedestrian_pose(now.position, now.heading)
-        before = self._replay.crowd(self.step - 1).pedestrian if self.step else np.full_like(now.pedestrian, NOBODY)
-        changed = np.flatnonzero(now.pedestrian != before)
-        if changed.size:
-            self._ghosts -= set(changed.tolist())
-            physics.set_pedestrian_contacts(changed, np.zeros(len(changed), dtype=bool))
-        appeared = changed[now.pedestrian[changed] != NOBODY]
-        pending = np.array(sorted(self._ghosts | set(appeared.tolist())), dtype=np.int64)
-        if not pending.size:
+        if now.changed.size:
+            physics.park_pedestrians(now.changed)
+            self._ghosts = self._ghosts - set(now.changed.tolist()) | (
+                set(now.changed.tolist()) & set(now.present.tolist())
+            )
+        physics.set_pedestrian_pose(now.present, now.position[now.present], now.quaternion[now.present])
+        if not self._ghosts:
             return
+        pending = np.array(sorted(self._ghosts), dtype=np.int64)
         robots = physics.agent_position()[self._slot_agent != NOBODY]
         gap = np.linalg.norm(now.position[pending][:, None] - robots, axis=-1)
         clear = (gap > self.scenario.contact_distance).all(axis=1)
@@ -305,15 +304,15 @@ class CrowdTask(base.Task):
 
     def _is_free(self, physics: Physics, place: Array) -> bool:
         scenario, clearance = self.scenario, self.scenario.spawn_clearance
-        people = self._replay.crowd(self.step).position
-        people = people[~np.isnan(people[:, 0])]
+        now = self._replay.crowd(self.step)
+        people = now.position[now.present]
         robots = physics.agent_position()[self._slot_agent != NOBODY]
         return bool(
             (np.linalg.norm(people - place, axis=1) >= scenario.contact_distance + clearance).all()
             and (np.linalg.norm(robots - place, axis=1) >= 2.0 * scenario.robot.radius + clearance).all()
         )
 
-    def _note_collisions(self, physics: Physics) -> IntArray:
+    def _note_collisions(self, physics: Physics) -> list[int]:
         """Translate new touches from slots to people; agents struck in this step, by slot."""
         present = self._replay.crowd(self.step - 1).pedestrian
         struck: list[int] = []
@@ -326,10 +325,11 @@ class CrowdTask(base.Task):
             else:
                 partner = int(present[touch.partner])
             self.collisions.append(Collision(touch=touch, agent=agent, partner=partner))
-        np.add.at(self._reward, struck, COLLISION_REWARD)
-        return np.unique(np.array(struck, dtype=np.int64))
+        for slot in struck:
+            self._reward[slot] += COLLISION_REWARD
+        return struck
 
-    def _end_runs(self, physics: Physics, struck: IntArray) -> None:
+    def _end_runs(self, physics: Physics, struck: list[int]) -> None:
         slots = np.flatnonzero(self._slot_agent != NOBODY)
         if not slots.size:
             return
@@ -339,9 +339,7 @@ class CrowdTask(base.Task):
         self._goal_distance[slots] = distance
         arrived = distance <= self.scenario.goal_radius
         late = self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]
-        taken_out = (
-            np.isin(slots, struck) if self.scenario.on_collision == "retire" else np.zeros(len(slots), dtype=bool)
-        )
+        taken_out = np.isin(slots, struck if self.scenario.on_collision == "retire" else [])
         self._reward[slots[arrived & ~taken_out]] += ARRIVAL_REWARD
         for row in np.flatnonzero(taken_out | arrived | late):
             slot, agent = int(slots[row]), int(agents[row])

@@ -55,7 +55,7 @@ def repulsive_force(obstacle: Array, present: NDArray[np.bool_], *, gain: float,
     Returns:
         Shape (n_agents, 2), away from the obstacles.
     """
-    distance = np.linalg.norm(obstacle, axis=-1)
+    distance = np.hypot(obstacle[..., 0], obstacle[..., 1])
     rho = np.maximum(distance, MINIMUM_DISTANCE)
     size = 0.5 * gain * (1.0 / rho - 1.0 / influence_distance) / rho**2
     size = np.where(present & (distance <= influence_distance), size, 0.0)
