@@ -199,8 +199,18 @@ class CrowdTask(base.Task):
         Returns:
             Arrays with a row a slot.
         """
-        sample, agent = self._sample, self._slot_agent
-        people = self._replay.crowd(self.step)
+        return self._observe(self._slot_agent)
+
+    def final_observation(self) -> dict[str, NDArray[Any]]:
+        """The observation with the agents whose run ended at this control step still in it, for whoever learns.
+
+        Returns:
+            As `get_observation`.
+        """
+        return self._observe(self._sample.agent)
+
+    def _observe(self, agent: IntArray) -> dict[str, NDArray[Any]]:
+        sample, people = self._sample, self._replay.crowd(self.step)
         return dict(
             observe(
                 active=agent != NOBODY,
