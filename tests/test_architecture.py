@@ -17,7 +17,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 ROWS = (
     {"resources", "geometry", "config", "files"},
     {"recordings"},
-    {"observation", "episode"},
+    {"observation", "episode", "features"},
     {"cast", "scene", "physics", "task", "environment"},
     {"tasks"},
     {"controllers"},
@@ -28,7 +28,7 @@ ROWS = (
     {"benchmark", "cli"},
 )
 # Controllers own no simulator: most rows above are closed to them.
-CONTROLLERS_MAY_IMPORT = {"resources", "geometry", "config", "observation", "controllers"}
+CONTROLLERS_MAY_IMPORT = {"resources", "geometry", "config", "observation", "features", "controllers"}
 # `socialnav_mj.load` imports `tasks` when it is called.
 EXCEPTIONS = {("socialnav_mj", "tasks")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
