@@ -42,7 +42,7 @@ def rollout(
 
     Raises:
         PhysicsError: If the simulation became invalid.
-        ValueError: If the controller's action is not allowed.
+        ValueError: If the controller's action or active policy is not allowed.
     """
     task, physics = environment.task, environment.physics
     scenario: Scenario = task.scenario
@@ -53,15 +53,16 @@ def rollout(
     recorder.note_sample()
     while not time_step.last():
         action = np.asarray(controller.act(time_step.observation), dtype=float)
-        recorder.note_action(action, getattr(controller, "active_policy", None))
+        agent = task.slot_agent
         time_step = environment.step(action)
+        recorder.note_action(agent, action, _checked_policy(controller, len(agent)))
         recorder.note_sample()
         digest.update(physics.data.qpos.tobytes())
         digest.update(physics.data.qvel.tobytes())
         if progress is not None and task.step % _PROGRESS_PERIOD == 0:
             progress(task.time)
     return recorder.episode(
-        policies=tuple(getattr(controller, "policies", (controller.name,))),
+        policies=_policies(controller),
         metadata=episode_metadata(
             task.recording,
             scenario,
@@ -71,6 +72,23 @@ def rollout(
             state_hash=digest.hexdigest(),
         ),
     )
+
+
+def _policies(controller: Controller) -> tuple[str, ...]:
+    return tuple(getattr(controller, "policies", (controller.name,)))
+
+
+def _checked_policy(controller: Controller, n_slots: int) -> NDArray[np.int64]:
+    policy = getattr(controller, "active_policy", None)
+    if policy is None:
+        return np.zeros(n_slots, dtype=np.int64)
+    policy, names = np.asarray(policy), _policies(controller)
+    if policy.shape != (n_slots,) or not np.isin(policy, np.arange(len(names))).all():
+        raise ValueError(
+            f"active_policy = {policy} of controller {controller.name!r}; expected shape ({n_slots},) with indices "
+            f"into its policies {names}"
+        )
+    return policy.astype(np.int64)
 
 
 class _Recorder:
@@ -94,11 +112,9 @@ class _Recorder:
             )
         )
 
-    def note_action(self, action: Array, policy: NDArray[np.int64] | None) -> None:
-        agent = self._task.slot_agent
+    def note_action(self, agent: NDArray[np.int64], action: Array, policy: NDArray[np.int64]) -> None:
         slots = np.flatnonzero(agent != NOBODY)
-        chosen = np.zeros(len(slots), dtype=np.int64) if policy is None else policy[slots]
-        self._actions.append((agent[slots], action[slots], chosen))
+        self._actions.append((agent[slots], action[slots], policy[slots]))
 
     def episode(self, *, policies: tuple[str, ...], metadata: dict[str, Any]) -> Episode:
         task, cast, dt = self._task, self._task.cast, self._task.scenario.control_timestep
