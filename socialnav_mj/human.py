@@ -39,7 +39,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
     last = np.floor(recording.end_time[cast.agent_index] / dt + 1e-6).astype(np.int64)
     last = np.maximum(last, cast.agent_appear_step)
     steps = int(max(last.max(), cast.pedestrian_last_step.max(initial=0))) + 1
-    time = np.arange(steps) * dt
+    time = np.arange(steps, dtype=float) * dt
     position, velocity, heading = recorded_series(recording, cast.agent_index, cast.agent_appear_step, last, steps, dt)
     near = np.linalg.norm(position - cast.agent_goal, axis=-1) <= scenario.goal_radius
     near[last, np.arange(len(last))] = True
@@ -70,8 +70,8 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
         agent_person=cast.agent_person.copy(),
         agent_start=cast.agent_start.copy(),
         agent_goal=cast.agent_goal.copy(),
-        agent_appear_time=cast.agent_appear_step * dt,
-        agent_spawn_time=cast.agent_appear_step * dt,
+        agent_appear_time=cast.agent_appear_step.astype(float) * dt,
+        agent_spawn_time=cast.agent_appear_step.astype(float) * dt,
         agent_deadline=np.full(n, np.nan),
         agent_end_time=end * dt,
         agent_outcome=np.full(n, Outcome.ARRIVED, dtype=np.int64),

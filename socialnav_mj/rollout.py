@@ -130,13 +130,13 @@ class _Recorder:
         end_step = np.where(task.end_step >= 0, task.end_step, t - 1)
         spawn_time = np.where(spawned, task.spawn_step * dt, np.nan)
         unfinished = np.where(spawned, Outcome.UNFINISHED, Outcome.NEVER_SPAWNED)
-        time = np.arange(t) * dt
+        time = np.arange(t, dtype=float) * dt
         return Episode(
             time=time,
             agent_person=cast.agent_person.copy(),
             agent_start=cast.agent_start.copy(),
             agent_goal=cast.agent_goal.copy(),
-            agent_appear_time=cast.agent_appear_step * dt,
+            agent_appear_time=cast.agent_appear_step.astype(float) * dt,
             agent_spawn_time=spawn_time,
             agent_deadline=spawn_time + cast.agent_allowed_steps * dt,
             agent_end_time=np.where(spawned, end_step * dt, np.nan),
@@ -196,8 +196,8 @@ def contact_columns(rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
         Keyword arguments of `Episode`, ordered by time, agent, partner.
     """
     rows = sorted(rows, key=lambda row: row[:4])
-    names = ("time", "agent", "partner_kind", "partner", "normal", "agent_heading", "agent_velocity")
-    names += ("partner_velocity", "duration", "position", "impulse", "peak_force")
+    names = "time agent partner_kind partner normal agent_heading agent_velocity partner_velocity duration".split()
+    names += ["position", "impulse", "peak_force"]
     shapes = {"normal": 2, "agent_velocity": 2, "partner_velocity": 2, "position": 2}
     columns = list(zip(*rows, strict=True)) if rows else [()] * len(names)
     result: dict[str, NDArray[Any]] = {}

@@ -86,7 +86,7 @@ def data_directories(data_dir: str | Path | None = None) -> tuple[Path, ...]:
 def load_recording(
     name_or_path: str | Path,
     *,
-    variant: Variant | None = None,
+    variant: str | None = None,
     data_dir: str | Path | None = None,
     frame_rate: float | None = None,
     axis_order: AxisOrder | None = None,
@@ -128,7 +128,7 @@ def load_recording(
                 f"no recording {str(name_or_path)!r}: it is neither in the catalogue ({', '.join(catalogue())}) "
                 f"nor a file or folder"
             )
-        kind, files = source_files(path, variant)
+        kind, files = source_files(path, _stated(variant))
         name = path.resolve().stem
         row = _known_by_checksum(kind, files)
     if row is not None:
@@ -137,12 +137,21 @@ def load_recording(
     return read_recording(files, name=name, variant=kind, frame_rate=frame_rate, axis_order=axis_order or "xy")
 
 
-def _variant(row: CatalogueRow, variant: Variant | None) -> Variant:
+def _variant(row: CatalogueRow, variant: str | None) -> Variant:
+    for known in row.variants:
+        if variant in (None, known):
+            return known
+    raise ValueError(f"recording {row.name!r} has no variant {variant!r}; available: {', '.join(row.variants)}")
+
+
+def _stated(variant: str | None) -> Variant | None:
     if variant is None:
-        return next(iter(row.variants))
-    if variant not in row.variants:
-        raise ValueError(f"recording {row.name!r} has no variant {variant!r}; available: {', '.join(row.variants)}")
-    return variant
+        return None
+    known: Variant
+    for known in get_args(Variant):
+        if known == variant:
+            return known
+    raise ValueError(f"unknown variant {variant!r}; available: {', '.join(get_args(Variant))}")
 
 
 def _find(row: CatalogueRow, variant: Variant, data_dir: str | Path | None) -> tuple[Path, ...]:
