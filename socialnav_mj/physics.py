@@ -38,7 +38,7 @@ class Touch:
     agent_heading: float
     """At first touch [rad]."""
     partner_heading: float
-    """At first touch [rad]."""
+    """At first touch; a pedestrian's is that of the control step [rad]."""
     agent_velocity: Array
     """(2,) just before [m/s]."""
     partner_velocity: Array
@@ -72,6 +72,8 @@ class Physics(MujocoPhysics):
         """
         physics = cls(MjData(MjModel(model)))
         physics.rearm_time = rearm_time
+        with physics.reset_context():
+            pass
         return physics
 
     def _reload_from_data(self, data: MjData) -> None:
@@ -284,6 +286,7 @@ class Physics(MujocoPhysics):
         qvel, before, contact = data.qvel, self._velocity_before, data.contact
         people = self._mocap_pos[:, :2]
         path = self._filled_path(people, nstep)
+        time, kinds_of_warning = data.time, np.count_nonzero(self._warnings)
         try:
             with self.check_invalid_state():
                 for k in range(nstep):
@@ -295,8 +298,11 @@ class Physics(MujocoPhysics):
                     # The floor is geom 0, and MuJoCo names it first: all else is a touch of two bodies.
                     if np.count_nonzero(contact.geom1):
                         self._note_touches(time, None if self._path_velocity is None else self._path_velocity[k])
+                    # One step later an invalid number has spread to all robots and nobody can tell whose it was.
+                    if np.count_nonzero(self._warnings) != kinds_of_warning:
+                        break
         except PhysicsError as error:
-            raise PhysicsError(f"at {data.time:.2f} s: {error}{self._culprit()}") from error
+            raise PhysicsError(f"at {time:.2f} s: {error}{self._culprit()}") from error
         self._path = self._path_velocity = None
 
     def refresh_poses(self) -> None:
@@ -313,11 +319,17 @@ class Physics(MujocoPhysics):
         return np.where(np.isnan(self._path), people, self._path)
 
     def _culprit(self) -> str:
-        bad = ~np.isfinite(self.data.qvel) | (np.abs(self.data.qvel) > 1e6)
-        slots = [slot for slot, dofs in enumerate(self._agent_dofs) if bad[dofs].any()]
-        return (
-            f"; robots with an invalid velocity: {', '.join(agent_name(s).rstrip('/') for s in slots)}" if slots else ""
-        )
+        """Name the robot whose state MuJoCo found invalid first, if that is what it warns of."""
+        warning = mujoco.mjtWarning
+        for kind, address in (
+            (warning.mjWARN_BADQPOS, self._qpos),
+            (warning.mjWARN_BADQVEL, self._qvel),
+            (warning.mjWARN_BADQACC, self._qvel),
+        ):
+            if self._new_warnings[int(kind)]:
+                slot = int(np.searchsorted(address, self.data.warning.lastinfo[int(kind)], side="right")) - 1
+                return f"; first invalid in {agent_name(slot).rstrip('/')}"
+        return ""
 
     # Contacts
 

@@ -1,0 +1,305 @@
+"""What is true: contacts, their pairs, velocities and impulses, and what happens to an invalid state."""
+
+import os
+from math import ceil
+
+import numpy as np
+import pytest
+from dm_control.rl.control import PhysicsError
+from scenes import TINY, environment_of, stand, state_of, still, walk
+
+import tasks
+from socialnav_mj.config import Scenario
+from socialnav_mj.controllers import GoStraight, Limits
+from socialnav_mj.episode import Partner
+from socialnav_mj.geometry import Array, quaternion_of_yaw
+from socialnav_mj.physics import Physics, Touch
+from socialnav_mj.rollout import rollout
+from socialnav_mj.scene import build_model
+
+TIMESTEP = 0.01  # [s]
+CONTACT_DISTANCE = 0.17 + 0.15  # [m]
+AWAY = (5.0, 5.0)
+
+
+def physics_of(n_agents: int = 1, n_pedestrians: int = 1, *, slippery: bool = False) -> Physics:
+    """A pool with agent i standing at (0, 3 i); slippery: wheels without motor or grip, so that robots slide freely."""
+    scenario = Scenario()
+    bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
+    model = build_model(scenario, n_agent_slots=n_agents, n_pedestrian_slots=n_pedestrians, **bounds)
+    if slippery:
+        model.actuator_gainprm[:] = 0.0
+        model.actuator_biasprm[:] = 0.0
+        wheels = [g for g in range(model.ngeom) if model.geom(g).name.endswith("_wheel")]
+        model.geom_friction[wheels] = 1e-4
+    physics = Physics.from_mujoco(model, rearm_time=scenario.contact_rearm_time)
+    with physics.reset_context():
+        for slot in range(n_agents):
+            physics.place_agent(slot, np.array([0.0, 3.0 * slot]), 0.0)
+        everybody = np.arange(n_pedestrians)
+        pose = np.tile(AWAY, (n_pedestrians, 1)), quaternion_of_yaw(np.zeros(n_pedestrians))
+        physics.set_pedestrian_pose(everybody, *pose)
+        physics.set_pedestrian_contacts(everybody, np.ones(n_pedestrians, dtype=bool))
+    return physics
+
+
+def lead(physics: Physics, positions: Array) -> list[Touch]:
+    """Move pedestrian 0 along one position a physics step; touches that began."""
+    path = np.full((len(positions), physics.n_pedestrians, 2), np.nan)
+    path[:, 0] = positions
+    velocity = np.zeros_like(path)
+    velocity[:-1] = np.diff(path, axis=0) / TIMESTEP
+    physics.set_pedestrian_path(path, velocity)
+    physics.step(len(positions))
+    return physics.new_touches()
+
+
+def flicker(physics: Physics, *phases: tuple[bool, int]) -> list[Touch]:
+    """Touch the robot or stay away for numbers of steps, one after the other."""
+    places = {True: lambda: physics.agent_position()[0] + (CONTACT_DISTANCE - 0.01, 0.0), False: lambda: np.array(AWAY)}
+    touches = []
+    for touching, steps in phases:
+        for _ in range(steps):
+            touches += lead(physics, places[touching]()[None])
+    return touches
+
+
+# Touches
+
+
+def test_head_on_touch_of_a_walker_has_the_figures_of_hand_calculation() -> None:
+    # A robot stands at the origin facing +x; somebody comes from x = 3 m at 1.3 m/s. They touch 0.32 m apart.
+    environment = environment_of(walk([(0, 0), (10, 0)], 1.0), walk([(3, 0), (-3, 0)], 1.3), agents=[1])
+    environment.reset()
+    while not environment.task.collisions:
+        environment.step(still(environment))
+    (collision,) = environment.task.collisions
+    touch = collision.touch
+    time = ceil((3.0 - CONTACT_DISTANCE) / 1.3 / TIMESTEP) * TIMESTEP  # the first physics step within the distance
+    walker = 3.0 - 1.3 * time
+    assert touch.kind == Partner.PEDESTRIAN and (collision.agent, collision.partner) == (0, 0)
+    assert touch.time == pytest.approx(time, abs=1e-9)
+    np.testing.assert_allclose(touch.normal, [1.0, 0.0], atol=1e-4)
+    np.testing.assert_allclose(touch.position, [0.5 * (0.17 + walker - 0.15), 0.0], atol=2e-4)
+    np.testing.assert_allclose(touch.agent_velocity, [0.0, 0.0], atol=1e-4)
+    np.testing.assert_allclose(touch.partner_velocity, [-1.3, 0.0], atol=1e-9)
+    assert (touch.agent_velocity - touch.partner_velocity) @ touch.normal == pytest.approx(1.3, abs=1e-4)
+    assert touch.agent_heading == pytest.approx(0.0, abs=1e-6)
+    assert touch.partner_heading == pytest.approx(-np.pi, abs=1e-9) or touch.partner_heading == pytest.approx(np.pi)
+
+
+def test_robot_that_drives_into_a_standing_person_keeps_its_velocity_of_before_the_contact() -> None:
+    person = stand((3.0, 0.0), 0.0, 10.0)
+    environment = environment_of(walk([(0, 0), (10, 0)], 1.0), person, agents=[1])
+    wheel = np.full(environment.action_spec().shape, 0.8 / 0.06)
+    environment.reset()
+    while not environment.task.collisions:
+        environment.step(wheel)
+    touch = environment.task.collisions[0].touch
+    assert touch.agent_velocity[0] == pytest.approx(0.8, rel=0.01)  # the wheels roll 0.3 % short
+    np.testing.assert_allclose(touch.partner_velocity, 0.0, atol=1e-12)
+    np.testing.assert_allclose(touch.position, [3.0 - 0.15, 0.0], atol=0.01)
+
+
+def test_touch_of_two_robots_is_seen_by_both_sides() -> None:
+    # Robots 1 m/s towards each other on one line, mirror images: they meet in the middle.
+    environment = environment_of(walk([(-3, 0), (3, 0)], 1.0), walk([(3, 0), (-3, 0)], 1.0), agents=[1, 2])
+    episode = rollout(environment, GoStraight())
+    assert episode.contact_agent[:2].tolist() == [0, 1]
+    assert episode.contact_partner[:2].tolist() == [1, 0]
+    assert (episode.contact_partner_kind[:2] == Partner.AGENT).all()
+    np.testing.assert_allclose(episode.contact_normal[:2], [[1.0, 0.0], [-1.0, 0.0]], atol=1e-3)
+    np.testing.assert_allclose(episode.contact_position[:2], 0.0, atol=1e-3)
+    np.testing.assert_allclose(episode.contact_agent_velocity[0], -episode.contact_agent_velocity[1], atol=1e-6)
+    np.testing.assert_array_equal(episode.contact_agent_velocity[:2], episode.contact_partner_velocity[1::-1])
+    assert episode.contact_agent_velocity[0, 0] == pytest.approx(1.0, abs=0.01)
+    for column in ("time", "impulse", "peak_force", "duration"):
+        first, second = getattr(episode, f"contact_{column}")[:2]
+        assert first == second > 0.0
+
+
+@pytest.mark.parametrize(("apart", "count"), [(1, 1), (19, 1), (20, 2), (40, 2)])
+def test_touch_counts_again_only_after_the_rearm_time_apart(apart: int, count: int) -> None:
+    touches = flicker(physics_of(), (False, 3), (True, 5), (False, apart), (True, 5))
+    assert len(touches) == count
+    assert touches[0].time == pytest.approx(0.03)
+    if count == 1:
+        assert touches[0].last_time == pytest.approx((3 + 5 + apart + 4) * TIMESTEP)
+    else:
+        assert touches[0].last_time == pytest.approx(0.07)
+        assert touches[1].time == pytest.approx((3 + 5 + apart) * TIMESTEP)
+
+
+def test_each_pair_is_counted_by_itself() -> None:
+    physics = physics_of(n_agents=2, n_pedestrians=1)
+    near = np.array([CONTACT_DISTANCE - 0.01, 0.0])
+    touches = lead(physics, np.array([near, near + (0.0, 3.0), near, near + (0.0, 3.0)]))
+    assert [(t.agent, t.partner, t.kind) for t in touches] == [(0, 0, Partner.PEDESTRIAN), (1, 0, Partner.PEDESTRIAN)]
+
+
+def test_reused_slots_do_not_inherit_touches() -> None:
+    physics, person = physics_of(), np.array([0])
+    assert len(flicker(physics, (True, 5))) == 1
+    physics.park_agent(0)
+    physics.place_agent(0, np.zeros(2), 0.0)
+    assert len(flicker(physics, (True, 5))) == 1
+    physics.park_pedestrians(person)
+    physics.set_pedestrian_pose(person, np.array([AWAY]), quaternion_of_yaw(np.zeros(1)))
+    assert len(flicker(physics, (True, 5))) == 0  # contact-free
+    physics.set_pedestrian_contacts(person, np.ones(1, dtype=bool))
+    assert len(flicker(physics, (True, 5))) == 1
+
+
+def test_parked_robot_is_as_new_when_it_is_placed_again() -> None:
+    physics = physics_of()
+    fresh = physics.get_state()
+    physics.set_twist(np.array([[1.0, 2.0]]))
+    physics.step(50)
+    assert physics.agent_velocity().any() and physics.data.qacc_warmstart.any()
+    physics.park_agent(0)
+    physics.place_agent(0, np.zeros(2), 0.0)
+    np.testing.assert_array_equal(physics.get_state(), fresh)
+    assert not physics.data.qacc_warmstart.any() and not physics.data.ctrl.any()
+
+
+# Impulse
+
+
+def test_impulse_is_the_momentum_that_a_walker_gives_to_a_free_robot() -> None:
+    physics = physics_of(slippery=True)
+    positions = np.stack([1.0 - 1.3 * TIMESTEP * np.arange(200), np.zeros(200)], axis=-1)
+    (touch,) = lead(physics, positions)
+    speed = float(-physics.agent_velocity()[0, 0])
+    assert speed > 1.2  # the walker goes on, and the robot with it
+    # 8 kg; the floor takes a thousandth while the robot rocks on its casters.
+    assert touch.impulse == pytest.approx(8.0 * speed, rel=0.003)
+    assert touch.peak_force * TIMESTEP < touch.impulse < touch.peak_force * (touch.last_time - touch.time + TIMESTEP)
+
+
+def test_impulse_between_two_free_robots_is_equal_and_opposite() -> None:
+    physics = physics_of(n_agents=2, slippery=True)
+    with physics.reset_context():
+        physics.place_agent(0, np.array([-0.5, 0.0]), 0.0)
+        physics.place_agent(1, np.array([0.5, 0.0]), 0.0)
+        physics.data.qvel[0] = 1.0  # the first one slides at 1 m/s
+    physics.step(150)
+    (touch,) = physics.new_touches()
+    first, second = physics.agent_velocity()[:, 0]
+    assert first + second == pytest.approx(1.0, abs=0.005)  # momentum
+    assert touch.impulse == pytest.approx(8.0 * second, rel=0.003)
+    assert first**2 + second**2 < 1.0  # energy
+    np.testing.assert_allclose(touch.agent_velocity, [1.0, 0.0], atol=0.01)
+    np.testing.assert_allclose(touch.partner_velocity, 0.0, atol=0.01)
+
+
+# Getters, poses
+
+
+def test_getters_return_arrays_that_the_caller_owns() -> None:
+    physics = physics_of(n_agents=2)
+    before = physics.get_state()
+    for name in ("position", "heading", "velocity", "yaw_rate", "tilt"):
+        value = getattr(physics, f"agent_{name}")()
+        assert len(value) == 2
+        value[...] = 7.0
+    np.testing.assert_array_equal(physics.get_state(), before)
+
+
+def test_getters_agree_with_the_named_bodies_after_a_control_step() -> None:
+    environment = environment_of(walk([(0, 0), (10, 4)], 1.0), walk([(3, 0), (3, 9)], 1.0), agents=[1])
+    environment.reset()
+    for _ in range(7):
+        environment.step(np.array([[9.0, 12.0]]))
+    named = environment.physics.named.data
+    np.testing.assert_allclose(named.xpos["agent_000/robot", :2], environment.physics.agent_position()[0], atol=1e-12)
+    np.testing.assert_allclose(named.xpos["pedestrian_000/pedestrian", :2], [3.0, 7 * 0.2], atol=1e-12)
+    heading = environment.physics.agent_heading()[0]
+    forward = named.xmat["agent_000/robot"].reshape(3, 3)[:2, 0]
+    np.testing.assert_allclose(forward, [np.cos(heading), np.sin(heading)], atol=1e-4)
+
+
+def test_pedestrian_moves_at_every_physics_step() -> None:
+    """A walker's contact force is smooth; a jump each control step would give peaks of kilonewtons."""
+    physics = physics_of()
+    positions = np.stack([1.0 - 1.3 * TIMESTEP * np.arange(150), np.zeros(150)], axis=-1)
+    (touch,) = lead(physics, positions)
+    assert touch.peak_force < 500.0
+
+
+def test_path_of_the_wrong_length_is_refused() -> None:
+    physics = physics_of()
+    physics.set_pedestrian_path(np.zeros((3, 1, 2)), np.zeros((3, 1, 2)))
+    with pytest.raises(ValueError, match="3 positions for 20 physics steps"):
+        physics.step(20)
+
+
+def test_new_physics_and_reset_have_every_slot_parked() -> None:
+    physics = physics_of(n_agents=3, n_pedestrians=2)
+    physics.step(10)
+    fresh = Physics.from_mujoco(physics.model.ptr, rearm_time=0.2)
+    for parked in (fresh, physics):
+        parked.reset()
+        assert not parked.model.geom_contype.any() and not parked.model.geom_conaffinity[1:].any()
+        assert (parked.data.qpos[2::9] < -1.0).all() and (parked.data.mocap_pos[:, 2] < -1.0).all()
+    before = physics.data.qpos.copy()
+    physics.step(100)
+    np.testing.assert_array_equal(physics.data.qpos, before)  # they need no floor
+    assert physics.data.ncon == 0
+
+
+# Invalid states
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e12])
+@pytest.mark.parametrize("field", ["qvel", "qpos"])
+def test_invalid_state_names_time_and_robot(field: str, value: float) -> None:
+    physics = physics_of(n_agents=3)
+    physics.step(50)
+    width = {"qvel": 8, "qpos": 9}[field]
+    getattr(physics.data, field)[2 * width + 1] = value
+    with pytest.raises(PhysicsError, match=rf"^at 0\.50 s: .*BAD{field.upper()}.*; first invalid in agent_002$"):
+        physics.step(20)
+
+
+def test_invalid_acceleration_names_the_robot() -> None:
+    physics = physics_of(n_agents=3)
+    physics.step(10)
+    physics.data.qfrc_applied[8 + 3] = 1e15
+    with pytest.raises(PhysicsError, match=r"^at 0\.10 s: .*BADQACC.*; first invalid in agent_001$"):
+        physics.step(20)
+
+
+def test_environment_can_be_reset_after_an_invalid_state() -> None:
+    environment = tasks.load("scenario_4", {"dataset": TINY})
+    environment.reset()
+    fresh = state_of(environment)
+    environment.step(still(environment))
+    environment.physics.data.qvel[3] = np.nan
+    with pytest.raises(PhysicsError, match=r"^at 0\.20 s: .*agent_000"):
+        environment.step(still(environment))
+    environment.reset()
+    np.testing.assert_array_equal(state_of(environment), fresh)
+    environment.step(still(environment))
+
+
+# A whole crowd
+
+
+@pytest.mark.skipif("SOCIALNAV_MJ_DATA" not in os.environ, reason="needs the UCY recordings, see SOCIALNAV_MJ_DATA")
+@pytest.mark.parametrize("scenario", ["scenario_2", "scenario_4"])
+def test_nobody_is_ejected_or_tipped_in_a_recorded_crowd(scenario: str) -> None:
+    """students003 begins with 30 people at once; robots that go straight to their goals hit many of them."""
+    environment = tasks.load(scenario, {"dataset": "students003", "time_limit": 40.0})
+    controller = GoStraight()
+    controller.reset(Limits.of(environment.task.scenario))
+    time_step = environment.reset()
+    speed = tilt = 0.0
+    while not time_step.last():
+        time_step = environment.step(controller.act(time_step.observation))
+        speed = max(speed, float(np.hypot(*environment.physics.agent_velocity().T).max()))
+        tilt = max(tilt, float(environment.physics.agent_tilt().max()))
+    assert len(environment.task.collisions) > 10
+    assert speed < 4.0  # [m/s]
+    assert np.degrees(tilt) < 26.0  # 47 degrees would tip it
+    assert np.degrees(environment.physics.agent_tilt().max()) < 5.0  # nobody lies
+    assert not environment.physics.data.warning.number.any()
