@@ -4,21 +4,47 @@ import json
 import shlex
 import sys
 from dataclasses import asdict, dataclass
+from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from dm_control.rl.control import PhysicsError
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
+from rich.table import Column, Table
+from rich.text import Text
 
 from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
+
+if TYPE_CHECKING:
+    from socialnav_mj.evaluation import Pace
 
 _console = Console()
 _errors = Console(stderr=True)
 
-Scenarios = Annotated[tuple[Literal[1, 2, 3, 4], ...], tyro.conf.arg(metavar="{1,2,3,4}")]
+Scenarios = Annotated[tuple[Literal[1, 2, 3, 4], ...], tyro.conf.arg(metavar="{1,2,3,4} ...")]
+Name = Annotated[str | None, tyro.conf.arg(metavar="NAME", help_behavior_hint="")]
+Folder = Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")]
+
+
+def _print(text: str, console: Console = _console, style: str = "") -> None:
+    """Plain text, which the terminal wraps by itself, so that paths stay whole in a copy or a file."""
+    console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+class _PaceColumn(ProgressColumn):
+    """Simulated time per real time, and the time left."""
+
+    def __init__(self, pace: "Pace") -> None:
+        super().__init__(table_column=Column(no_wrap=True))
+        self._pace = pace
+
+    def render(self, task: Task) -> Text:
+        rate, left = self._pace.rate, self._pace.left
+        if rate is None or left is None:
+            return Text("")
+        return Text(f"{rate:.0f} x real time, {timedelta(seconds=round(left))} left", style="progress.remaining")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +56,9 @@ class Evaluate:
 
     dataset: str = "plaza"
     """Name in the catalogue (see `list`), or path of a recording's file or folder."""
-    variant: str | None = None
+    variant: Name = None
     """Which annotation of the recording (see `data list`); the first by default."""
-    data_dir: Path | None = None
+    data_dir: Folder = None
     """Where recordings are looked for first; then in $SOCIALNAV_MJ_DATA, then in the user cache."""
     scenarios: Scenarios = (1, 2, 3, 4)
     """Scenarios that replace 10, 30, 70, 90 % of the people."""
@@ -44,7 +70,7 @@ class Evaluate:
     """Seed of the first draw; the others count up from it."""
     jobs: int = -1
     """Processes; -1 for one a core."""
-    out: Path | None = None
+    out: Folder = None
     """Folder of the results; runs/DATASET by default."""
     robot_radius: float = Robot.radius
     """[m]"""
@@ -60,7 +86,7 @@ class Evaluate:
     def run(self) -> None:
         """Evaluate, then report."""
         from socialnav_mj.analysis.report import write_report
-        from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
+        from socialnav_mj.evaluation import Evaluation, Pace, evaluate, jobs_of
 
         names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
         evaluation = Evaluation(
@@ -73,29 +99,28 @@ class Evaluate:
             seed=self.seed,
             task_kwargs={name: getattr(self, name) for name in names},
         )
-        out = self.out or Path("runs") / Path(self.dataset).stem
+        out = self.out or Path("runs") / Path(self.dataset).resolve().stem
+        episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)
+        jobs = jobs_of(evaluation)
+        pace = Pace(jobs)
         columns = (
             TextColumn("{task.description}"),
-            BarColumn(),
+            BarColumn(bar_width=20),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
+            _PaceColumn(pace),
+            TextColumn("in"),
             TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
         )
         with Progress(*columns, console=_errors) as progress:
-            bar = progress.add_task("episodes", total=len(jobs_of(evaluation)), rate="")
-            simulated = 0.0
-            for done in evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs):
-                simulated += done.simulated_time
-                elapsed = progress.tasks[0].elapsed or 0.0
-                rate = f"{simulated / elapsed:.0f} x real time" if simulated and elapsed else ""
-                progress.update(bar, advance=1, rate=rate)
+            bar = progress.add_task("episodes", total=len(jobs))
+            for done in episodes:
+                pace.note(done)
+                progress.update(bar, advance=1)
                 if done.error is not None:
-                    progress.console.print(f"{done.job.file_name}: {done.error}", style="red", markup=False)
+                    _print(f"{done.job.file_name}: {done.error}", progress.console, style="red")
         with _errors.status("tables and traces"):
             report = write_report(out, console=_console, n_jobs=self.jobs)
-        _console.print(f"report: {report}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)", markup=False)
+        _print(f"report: {report}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +137,7 @@ class Report:
         from socialnav_mj.analysis.report import write_report
 
         path = write_report(self.folder, console=_console, n_jobs=self.jobs)
-        _console.print(f"report: {path}", markup=False)
+        _print(f"report: {path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +169,7 @@ class List:
 class DataList:
     """Known recordings: source, licence, checksums, frame rate, scale, and whether they are on this machine."""
 
-    data_dir: Path | None = None
+    data_dir: Folder = None
     """Where recordings are looked for first."""
 
     def run(self) -> None:
@@ -153,6 +178,8 @@ class DataList:
 
         for name, row in catalogue().items():
             table = Table(show_header=False, title=f"{name}: {row.title}", title_justify="left")
+            table.add_column()
+            table.add_column(overflow="fold")
             for label in ("source", "licence", "scale"):
                 table.add_row(label, getattr(row, label))
             table.add_row("frame rate", f"{row.frame_rate:g} Hz")
@@ -173,9 +200,9 @@ class DataInfo:
 
     name: tyro.conf.Positional[str]
     """Name in the catalogue, or path of a recording."""
-    variant: str | None = None
+    variant: Name = None
     """Which annotation; the first by default."""
-    data_dir: Path | None = None
+    data_dir: Folder = None
     """Where recordings are looked for first."""
 
     def run(self) -> None:
@@ -187,7 +214,7 @@ class DataInfo:
 
         recording = load_recording(self.name, variant=self.variant, data_dir=self.data_dir)
         _console.print(Markdown(facts_table({recording.name: facts(recording)})))
-        _console.print(f"variant {recording.variant}, checksum {recording.checksum}", markup=False)
+        _print(f"variant {recording.variant}, checksum {recording.checksum}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,7 +223,7 @@ class DataFetch:
 
     name: tyro.conf.Positional[str]
     """Name in the catalogue."""
-    data_dir: Path | None = None
+    data_dir: Folder = None
     """Where to put it; $SOCIALNAV_MJ_DATA, or the user cache, by default."""
 
     def run(self) -> None:
@@ -204,7 +231,7 @@ class DataFetch:
         from socialnav_mj.recordings.fetch import fetch
 
         for path in fetch(self.name, data_dir=self.data_dir):
-            _console.print(str(path), markup=False)
+            _print(str(path))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,7 +255,7 @@ class Bench:
 
     dataset: str = "plaza"
     """Name in the catalogue, or path of a recording."""
-    data_dir: Path | None = None
+    data_dir: Folder = None
     """Where recordings are looked for first."""
     scenarios: Scenarios = (1, 4)
     """Scenarios to measure."""
@@ -238,7 +265,7 @@ class Bench:
     """Seed of the draw."""
     repetitions: int = 3
     """Episodes and bare runs, in turn; the median is shown."""
-    out: Path | None = None
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """JSON file to write, with package versions and the recording's checksum."""
 
     def run(self) -> None:
@@ -312,11 +339,13 @@ def main(args: list[str] | None = None) -> None:
         args=args,
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
     )
+    # As `python -m` does, so that package.module:Class finds what lies here; last, so that it hides nothing.
+    sys.path.append(str(Path.cwd()))
     try:
         command.run()
     except KeyboardInterrupt:
-        _errors.print("interrupted; the same command goes on where it was", markup=False)
+        _print("interrupted; the same command goes on where it was", _errors)
         sys.exit(130)
     except (ValueError, OSError, RuntimeError, PhysicsError) as error:
-        _errors.print(f"error: {error}", style="red", markup=False)
+        _print(f"error: {error}", _errors, style="red")
         sys.exit(2)

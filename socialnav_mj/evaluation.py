@@ -1,22 +1,25 @@
 """Many episodes: a grid of scenarios, controllers and draws, in parallel, resumable, one file an episode."""
 
 import json
-from collections.abc import Iterator
+import traceback
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from joblib import Parallel, delayed
 
 import tasks
+from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_config, make_controller
 from socialnav_mj.environment import make_scenario
 from socialnav_mj.episode import EpisodeError, read_header
 from socialnav_mj.files import write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.recordings import Recording, load_recording
-from socialnav_mj.rollout import rollout
+from socialnav_mj.rollout import recording_metadata, rollout
 
 
 class EvaluationError(RuntimeError):
@@ -73,6 +76,11 @@ class Job:
         label = "".join(c if c.isalnum() or c in "_-=." else "-" for c in self.controller)
         return f"{self.scenario}.{label}.draw_{self.draw:03d}.npz"
 
+    @property
+    def cost(self) -> float:
+        """CPU time that it takes, about [s]: 2.5/4.2/7/9 s in scenarios 1 to 4, half a second for recorded people."""
+        return 0.5 if self.controller == HUMAN else 1.7 + 8.0 * tasks.SHARES[self.scenario]
+
     def task_kwargs(self) -> dict[str, Any]:
         """Keyword arguments of `tasks.load`, apart from the recording.
 
@@ -87,9 +95,49 @@ class Done:
     """What is told of a finished job."""
 
     job: Job
-    simulated_time: float
-    """[s]; 0 if the episode was there already or failed."""
+    simulated_time: float | None = None
+    """[s]; None if the episode was there already or failed."""
     error: str | None = None
+    """What went wrong, and where."""
+
+
+class Pace:
+    """How fast the episodes of an evaluation get done, and how long the rest will take."""
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        """Start the clock.
+
+        Args:
+            jobs: All that are to be run or there already.
+        """
+        self._begin = self._last = monotonic()
+        self._waiting = sum(job.cost for job in jobs)
+        self._finished = self._simulated = 0.0
+
+    def note(self, done: Done) -> None:
+        """Account for one job.
+
+        Args:
+            done: Of `evaluate`.
+        """
+        self._waiting -= done.job.cost
+        if done.simulated_time is not None:
+            self._finished += done.job.cost
+            self._simulated += done.simulated_time
+        self._last = monotonic()
+
+    @property
+    def rate(self) -> float | None:
+        """Simulated over real time, all processes together; None before the first episode."""
+        return self._simulated / (self._last - self._begin) if self._simulated else None
+
+    @property
+    def left(self) -> float | None:
+        """Time to the end if the rest costs what the finished episodes did [s]; None before the first episode."""
+        if not self._finished:
+            return None
+        total = (self._last - self._begin) * self._waiting / self._finished
+        return max(0.0, total - (monotonic() - self._last))
 
 
 def jobs_of(evaluation: Evaluation) -> list[Job]:
@@ -110,7 +158,7 @@ def jobs_of(evaluation: Evaluation) -> list[Job]:
 
 
 def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n_jobs: int = -1) -> Iterator[Done]:
-    """Run what is not there yet.
+    """Run what is not there yet; everything that can be wrong with the request is told before anything runs.
 
     Args:
         evaluation: What is to be run.
@@ -118,38 +166,46 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
         command: Kept in `run.json`.
         n_jobs: Processes; -1 for one a core.
 
-    Yields:
-        A note of each episode, those already there first.
+    Returns:
+        A note of each episode, those already there first. It raises `EvaluationError` after all others have run, if
+        some could not be.
 
     Raises:
         FileNotFoundError: If the recording is not there.
         EpisodeError: If an episode of the folder is damaged, or was run with another configuration.
-        EvaluationError: After all others have run, if some could not be.
-        ValueError: If the evaluation asks for what does not exist.
+        ValueError: If the evaluation asks for what does not exist or is not allowed.
     """
+    if n_jobs == 0:
+        raise ValueError("n_jobs = 0 is not allowed; allowed: integers >= 1, or -1 for one a core")
     folder = Path(folder)
     recording = _recording(evaluation.dataset, evaluation.variant, evaluation.data_dir)
     jobs = jobs_of(evaluation)
-    configurations = {name: controller_config(make_controller(name)) for name in evaluation.controllers}
-    waiting = []
+    if len({job.file_name for job in jobs}) < len(jobs):
+        raise ValueError(f"controllers {evaluation.controllers} give files of the same name; leave out all but one")
+    for scenario in evaluation.scenarios:
+        _scenario(evaluation, scenario, evaluation.seed)
+    configurations = _controller_configurations(evaluation.controllers)
+    _check_folder(folder / "episodes", jobs, recording, configurations)
+    write_whole(
+        folder / "run.json",
+        (json.dumps({"command": command, "controllers": [*configurations]}, indent=1) + "\n").encode(),
+    )
+    return _run_all(jobs, folder / "episodes", n_jobs)
+
+
+def _run_all(jobs: list[Job], folder: Path, n_jobs: int) -> Iterator[Done]:
+    waiting, failed = [], 0
     for job in jobs:
-        path = folder / "episodes" / job.file_name
-        if path.exists():
-            _check_same(path, job, recording, configurations.get(job.controller, {}))
-            yield Done(job=job, simulated_time=0.0)
+        if (folder / job.file_name).exists():
+            yield Done(job=job)
         else:
             waiting.append(job)
-    _note_run(folder, evaluation, command)
-    failed = []
-    for done in Parallel(n_jobs=n_jobs, return_as="generator_unordered")(
-        delayed(_run)(job, folder / "episodes") for job in waiting
-    ):
-        if done.error is not None:
-            failed.append(f"{done.job.file_name}: {done.error}")
+    for done in Parallel(n_jobs=n_jobs, return_as="generator_unordered")(delayed(_run)(job, folder) for job in waiting):
+        failed += done.error is not None
         yield done
     if failed:
         raise EvaluationError(
-            f"{len(failed)} of {len(jobs)} episodes failed, the others are kept:\n" + "\n".join(failed)
+            f"{failed} of {len(jobs)} episodes failed, the others are kept; the same command runs the failed ones again"
         )
 
 
@@ -158,14 +214,17 @@ def _run(job: Job, folder: Path) -> Done:
     evaluation = job.evaluation
     try:
         recording = _recording(evaluation.dataset, evaluation.variant, evaluation.data_dir)
-        environment = tasks.load(job.scenario, {**job.task_kwargs(), "dataset": recording})
         if job.controller == HUMAN:
-            episode = human_episode(recording, environment.task.scenario, scenario_name=job.scenario)
+            scenario = _scenario(evaluation, job.scenario, job.draw)
+            episode = human_episode(recording, scenario, scenario_name=job.scenario)
         else:
+            environment = tasks.load(job.scenario, {**job.task_kwargs(), "dataset": recording})
             episode = rollout(environment, make_controller(job.controller), scenario_name=job.scenario)
         episode.save(folder / job.file_name)
     except Exception as error:  # noqa: BLE001  whatever it is, it is told and the other episodes go on
-        return Done(job=job, simulated_time=0.0, error=f"{type(error).__name__}: {error}")
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"{type(error).__name__}: {error} ({frame.filename}:{frame.lineno})"
+        return Done(job=job, error=text)
     return Done(job=job, simulated_time=float(episode.time[-1]))
 
 
@@ -174,30 +233,53 @@ def _recording(dataset: str, variant: str | None, data_dir: str | None) -> Recor
     return load_recording(dataset, variant=variant, data_dir=data_dir)
 
 
-def _check_same(path: Path, job: Job, recording: Recording, configuration: dict[str, Any]) -> None:
-    metadata = read_header(path)["metadata"]
-    scenario = make_scenario(share=tasks.SHARES[job.scenario], **job.task_kwargs())
-    expected = {
-        "scenario": json.loads(json.dumps(scenario.as_dict())),
-        "controller_config": json.loads(json.dumps(configuration)),
-    }
-    for name, wanted in expected.items():
-        found = metadata[name]
-        differing = sorted(key for key in {*wanted, *found} if wanted.get(key) != found.get(key))
-        if differing:
-            key = differing[0]
-            raise EpisodeError(
-                f"{path} was run with {name}.{key} = {found.get(key)!r}, but {wanted.get(key)!r} is asked for; "
-                "choose another output folder, or delete the file to have it run again"
+def _scenario(evaluation: Evaluation, name: str, draw: int) -> Scenario:
+    return make_scenario(**{"share": tasks.SHARES[name], **evaluation.task_kwargs, "seed": draw})
+
+
+def _controller_configurations(specs: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """Configuration of each controller by the name it goes by in tables, the human row's at the end."""
+    configurations: dict[str, dict[str, Any]] = {}
+    for spec in specs:
+        controller = make_controller(spec)
+        if controller.name in (*configurations, HUMAN):
+            raise ValueError(
+                f"controller {spec!r} is named {controller.name!r} like another row of the tables; give it another name"
             )
-    if metadata["recording"]["checksum"] != recording.checksum:
+        configurations[controller.name] = controller_config(controller)
+    return {**configurations, HUMAN: {}}
+
+
+def _check_folder(
+    folder: Path, jobs: list[Job], recording: Recording, configurations: dict[str, dict[str, Any]]
+) -> None:
+    """A folder holds one recording and one configuration: what is there has to agree with what is asked for."""
+    job_of = {job.file_name: job for job in jobs}
+    for path in sorted(folder.glob("[!.]*.npz")):
+        metadata = read_header(path)["metadata"]
+        try:
+            job, found = job_of.get(path.name), metadata["scenario"]
+            name, draw = (job.scenario, job.draw) if job else (metadata["scenario_name"], metadata["draw"])
+            scenario = _scenario(jobs[0].evaluation, name, draw)
+            pairs: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+                "recording": (recording_metadata(recording), metadata["recording"]),
+                "scenario": (scenario.as_dict(), found),
+            }
+            if metadata["controller"] in configurations:
+                wanted = configurations[metadata["controller"]]
+                pairs["controller_config"] = (wanted, metadata["controller_config"])
+        except (KeyError, TypeError) as error:
+            raise EpisodeError(f"{path} was not run by an evaluation: its metadata lack {error}") from error
+        for key, (wanted, given) in pairs.items():
+            _check_same(path, key, wanted, given)
+
+
+def _check_same(path: Path, key: str, wanted: Any, found: Any) -> None:
+    if isinstance(wanted, dict) and isinstance(found, dict):
+        for name in (*wanted, *(name for name in found if name not in wanted)):
+            _check_same(path, f"{key}.{name}", wanted.get(name), found.get(name))
+    elif wanted != found:
         raise EpisodeError(
-            f"{path} was run on recording {metadata['recording']['name']!r} with checksum "
-            f"{metadata['recording']['checksum']}, but {recording.name!r} with {recording.checksum} is asked for; "
+            f"{path} was run with {key} = {found!r}, but {wanted!r} is asked for; "
             "choose another output folder, or delete the file to have it run again"
         )
-
-
-def _note_run(folder: Path, evaluation: Evaluation, command: str) -> None:
-    content = {"command": command, "controllers": [*evaluation.controllers, HUMAN]}
-    write_whole(folder / "run.json", (json.dumps(content, indent=1) + "\n").encode())

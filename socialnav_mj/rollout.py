@@ -280,13 +280,25 @@ def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> d
         **rest,
         "scenario": scenario.as_dict(),
         "draw": scenario.seed,
-        "recording": {
-            "name": recording.name,
-            "variant": recording.variant,
-            "checksum": recording.checksum,
-            "frame_rate": recording.frame_rate,
-        },
+        "recording": recording_metadata(recording),
         "versions": package_versions(PACKAGES),
+    }
+
+
+def recording_metadata(recording: Recording) -> dict[str, Any]:
+    """What tells a recording from others.
+
+    Args:
+        recording: The crowd.
+
+    Returns:
+        JSON values.
+    """
+    return {
+        "name": recording.name,
+        "variant": recording.variant,
+        "checksum": recording.checksum,
+        "frame_rate": recording.frame_rate,
     }
 
 

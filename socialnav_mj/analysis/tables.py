@@ -146,7 +146,7 @@ def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs:
         EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, or if episodes that
             would be averaged or compared differ in their configuration; the files are named.
     """
-    paths = sorted((Path(folder) / "episodes").glob("*.npz"))
+    paths = sorted((Path(folder) / "episodes").glob("[!.]*.npz"))  # not what an interruption left
     if not paths:
         raise FileNotFoundError(f"no episodes in {Path(folder) / 'episodes'}; expected *.npz files")
     read = joblib.Parallel(n_jobs=n_jobs)(joblib.delayed(_read)(path) for path in paths)
