@@ -80,7 +80,7 @@ def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
         scenario: Gives share, seed, time step and deadlines.
 
     Returns:
-        The cast. People who are not there at any control step are neither agents nor pedestrians.
+        The cast. People who are not there at any control step are not replayed.
 
     Raises:
         ValueError: If the draw has no agents.

@@ -1,7 +1,9 @@
 """Frozen configuration: the robot's dimensions and the scenario's numbers."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from math import ceil, pi
+from math import ceil, isfinite, pi
+from numbers import Integral, Real
 from typing import Any, Literal, get_args
 
 TurnLimit = Literal["per_step", "per_second"]
@@ -11,6 +13,11 @@ OnCollision = Literal["continue", "retire"]
 def _require(condition: bool, name: str, given: object, allowed: str) -> None:
     if not condition:
         raise ValueError(f"{name} = {given!r} is not allowed; allowed: {allowed}")
+
+
+def _require_number(given: Any, name: str, allowed: str, holds: Callable[[float], bool]) -> None:
+    is_number = isinstance(given, Real) and not isinstance(given, bool) and isfinite(given)
+    _require(is_number and holds(given), name, given, allowed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +37,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("radius", "wheel_radius", "track", "max_speed"):
-            _require(getattr(self, name) > 0.0, f"Robot.{name}", getattr(self, name), "numbers > 0")
+            _require_number(getattr(self, name), f"Robot.{name}", "numbers > 0", lambda value: value > 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,13 +74,14 @@ class Scenario:
     """Two bodies must have been apart this long before their next touch counts as a new collision [s]."""
 
     def __post_init__(self) -> None:
-        _require(0.0 < self.share <= 1.0, "share", self.share, "numbers in (0, 1]")
+        _require_number(self.share, "share", "numbers in (0, 1]", lambda value: 0.0 < value <= 1.0)
         _require(
-            isinstance(self.seed, int) and not isinstance(self.seed, bool) and self.seed >= 0,
+            isinstance(self.seed, Integral) and not isinstance(self.seed, bool) and self.seed >= 0,
             "seed",
             self.seed,
             "integers >= 0",
         )
+        object.__setattr__(self, "seed", int(self.seed))  # numpy's integers are no JSON values
         _require(self.turn_limit in get_args(TurnLimit), "turn_limit", self.turn_limit, ", ".join(get_args(TurnLimit)))
         _require(
             self.on_collision in get_args(OnCollision),
@@ -82,7 +90,7 @@ class Scenario:
             ", ".join(get_args(OnCollision)),
         )
         for name in ("pedestrian_radius", "control_timestep", "physics_timestep", "goal_radius"):
-            _require(getattr(self, name) > 0.0, name, getattr(self, name), "numbers > 0")
+            _require_number(getattr(self, name), name, "numbers > 0", lambda value: value > 0.0)
         for name in (
             "deadline_base",
             "deadline_per_metre",
@@ -90,7 +98,7 @@ class Scenario:
             "spawn_clearance",
             "contact_rearm_time",
         ):
-            _require(getattr(self, name) >= 0.0, name, getattr(self, name), "numbers >= 0")
+            _require_number(getattr(self, name), name, "numbers >= 0", lambda value: value >= 0.0)
         _require(
             abs(self.control_timestep / self.physics_timestep - self.n_sub_steps) < 1e-6,
             "control_timestep",

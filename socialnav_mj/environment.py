@@ -1,5 +1,6 @@
 """From keyword arguments to a scenario, and from a scenario to a dm_control environment."""
 
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -91,11 +92,11 @@ def make_environment(
         ValueError: If a value is not allowed, or seed and an integer random are both given.
         FileNotFoundError: If the recording is not there.
     """
-    if isinstance(random, int) and seed is not None:
+    if isinstance(random, Integral) and seed is not None:
         raise ValueError(f"seed = {seed} and random = {random} are both given; they name the same thing, give one")
     scenario = make_scenario(
         share=share,
-        seed=random if isinstance(random, int) else seed or 0,
+        seed=random if isinstance(random, Integral) else 0 if seed is None else seed,
         robot_radius=robot_radius,
         pedestrian_radius=pedestrian_radius,
         turn_limit=turn_limit,

@@ -7,13 +7,13 @@ Array = NDArray[np.float64]
 
 
 def wrap_angle(angle: ArrayLike) -> Array:
-    """Map angles to [-pi, pi).
+    """Map angles to [-pi, pi]; odd multiples of pi go to -pi, those a rounding error below them to pi.
 
     Args:
         angle: Angles of any shape [rad].
 
     Returns:
-        The same shape, in [-pi, pi) [rad].
+        The same shape, in [-pi, pi] [rad].
     """
     return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
 

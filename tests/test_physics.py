@@ -132,8 +132,8 @@ def test_touch_counts_again_only_after_the_rearm_time_apart(apart: int, count: i
 
 def test_each_pair_is_counted_by_itself() -> None:
     physics = physics_of(n_agents=2, n_pedestrians=1)
-    near = np.array([CONTACT_DISTANCE - 0.01, 0.0])
-    touches = lead(physics, np.array([near, near + (0.0, 3.0), near, near + (0.0, 3.0)]))
+    near = CONTACT_DISTANCE - 0.01
+    touches = lead(physics, np.array([(near, 0.0), (near, 3.0)] * 2))
     assert [(t.agent, t.partner, t.kind) for t in touches] == [(0, 0, Partner.PEDESTRIAN), (1, 0, Partner.PEDESTRIAN)]
 
 

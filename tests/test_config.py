@@ -1,0 +1,74 @@
+"""The configuration: what it derives, what it refuses, and that it survives JSON."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from socialnav_mj.config import Robot, Scenario
+
+
+def test_figures_that_follow_from_the_defaults_are_those_of_the_design() -> None:
+    scenario = Scenario()
+    assert scenario.n_sub_steps == 20
+    assert scenario.contact_distance == pytest.approx(0.32)
+    assert scenario.max_yaw_rate == pytest.approx(2.618, abs=1e-3)
+    assert Scenario(turn_limit="per_second").max_yaw_rate == pytest.approx(0.5236, abs=1e-4)
+    assert Scenario(control_timestep=0.4).max_yaw_rate == pytest.approx(1.309, abs=1e-3)
+
+
+@pytest.mark.parametrize(("distance", "steps"), [(0.0, 75), (1.0, 85), (2.5, 100), (2.501, 101), (10.0, 175)])
+def test_deadline_is_15_s_and_2_s_a_metre_rounded_up(distance: float, steps: int) -> None:
+    assert Scenario().allowed_steps(distance) == steps
+
+
+def test_at_least_one_step_is_allowed() -> None:
+    assert Scenario(deadline_base=0.0).allowed_steps(0.0) == 1
+
+
+def test_configuration_survives_json() -> None:
+    scenario = Scenario(share=0.7, seed=np.int64(4), robot=Robot(radius=0.2), turn_limit="per_second")
+    again = Scenario.from_dict(json.loads(json.dumps(scenario.as_dict())))
+    assert again == scenario
+    assert type(scenario.seed) is int
+
+
+def test_configuration_cannot_be_changed() -> None:
+    with pytest.raises(AttributeError):
+        Scenario().share = 0.5  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("share", 0.0, r"numbers in \(0, 1\]"),
+        ("share", 1.01, r"numbers in \(0, 1\]"),
+        ("share", float("nan"), r"numbers in \(0, 1\]"),
+        ("share", "0.1", r"numbers in \(0, 1\]"),
+        ("share", True, r"numbers in \(0, 1\]"),
+        ("seed", -1, "integers >= 0"),
+        ("seed", 1.0, "integers >= 0"),
+        ("seed", True, "integers >= 0"),
+        ("seed", "1", "integers >= 0"),
+        ("turn_limit", "per_minute", "per_step, per_second"),
+        ("on_collision", "stop", "continue, retire"),
+        ("pedestrian_radius", 0.0, "numbers > 0"),
+        ("goal_radius", float("inf"), "numbers > 0"),
+        ("physics_timestep", None, "numbers > 0"),
+        ("control_timestep", 0.205, r"whole multiples of physics_timestep = 0\.01"),
+        ("control_timestep", 0.001, r"whole multiples of physics_timestep = 0\.01"),
+        ("deadline_base", -1.0, "numbers >= 0"),
+        ("contact_rearm_time", float("nan"), "numbers >= 0"),
+    ],
+)
+def test_value_that_is_not_allowed_is_named_with_what_is(name: str, value: Any, allowed: str) -> None:
+    with pytest.raises(ValueError, match=rf"^{name} = .* is not allowed; allowed: {allowed}$"):
+        Scenario(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["radius", "wheel_radius", "track", "max_speed"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("inf"), "wide"])
+def test_robot_dimension_that_is_not_allowed_is_named(name: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=rf"^Robot\.{name} = .* is not allowed; allowed: numbers > 0$"):
+        Robot(**{name: value})
