@@ -35,7 +35,7 @@ def test_straight_run_past_a_standing_person_has_the_values_worked_out_by_hand()
         [Agent(positions=EAST, goal=(4.5, 0), spawn_step=3, delay_steps=2)], [standing((2, 0.6), 30)]
     )
     values = {name: array[0] for name, array in metrics.per_agent(episode).items()}
-    assert values == {
+    expected = {
         "success": True,
         "arrived": True,
         "timed_out": False,
@@ -58,6 +58,7 @@ def test_straight_run_past_a_standing_person_has_the_values_worked_out_by_hand()
         "first_partner": metrics.NOBODY,
         "spawn_delay": pytest.approx(0.4),
     }
+    assert {name: values[name] for name in expected} == expected
 
 
 def test_detour_round_a_corner_has_ratio_seven_fifths():

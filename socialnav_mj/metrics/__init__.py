@@ -1,6 +1,7 @@
 """Metrics: pure functions of one recorded `Episode`, each with one value per agent.
 
-The human row is scored by the same functions, on an Episode made of the recorded tracks.
+The human row is scored by the same functions, on an Episode made of the recorded tracks. Formulas, units, ranges and
+worked examples: docs/metrics.md; the same names as others define them: `socialnav_mj.metrics.dialects`.
 """
 
 from typing import Any
@@ -9,6 +10,24 @@ from numpy.typing import NDArray
 
 from socialnav_mj.episode import Episode, Partner
 from socialnav_mj.metrics.collisions import NOBODY, collisions, first_partner
+from socialnav_mj.metrics.contacts import Fault
+from socialnav_mj.metrics.faults import (
+    collision_impulse,
+    collisions_by_fault,
+    collisions_over_limit,
+    largest_closing_speed,
+    largest_peak_force,
+    repeated_collisions,
+    struck_standing,
+)
+from socialnav_mj.metrics.kinematics import (
+    maximum_acceleration,
+    maximum_jerk,
+    maximum_speed,
+    mean_acceleration,
+    mean_jerk,
+    time_not_moving,
+)
 from socialnav_mj.metrics.navigation import (
     active_steps,
     arrived,
@@ -25,6 +44,8 @@ from socialnav_mj.metrics.navigation import (
     time_under_way,
     timed_out,
 )
+from socialnav_mj.metrics.path import failures_to_progress, path_irregularity, spl
+from socialnav_mj.metrics.proxemics import ZONES, mean_distance, space_compliance, zone_share
 from socialnav_mj.metrics.proximity import (
     INTIMATE_DISTANCE,
     intimate_intrusions,
@@ -32,31 +53,56 @@ from socialnav_mj.metrics.proximity import (
     minimum_distance,
     nearest_pedestrian_distance,
 )
+from socialnav_mj.metrics.social_force import social_work
+from socialnav_mj.metrics.time_to_collision import minimum_time_to_collision
 
 __all__ = [
     "INTIMATE_DISTANCE",
     "NOBODY",
+    "ZONES",
+    "Fault",
     "active_steps",
     "arrived",
     "average_speed",
+    "collision_impulse",
     "collisions",
+    "collisions_by_fault",
+    "collisions_over_limit",
     "completion_censored",
     "completion_steps",
     "completion_time",
     "displacement",
     "distance_to_displacement",
+    "failures_to_progress",
     "first_partner",
     "intimate_intrusions",
     "intrusion_share",
+    "largest_closing_speed",
+    "largest_peak_force",
+    "maximum_acceleration",
+    "maximum_jerk",
+    "maximum_speed",
+    "mean_acceleration",
+    "mean_distance",
+    "mean_jerk",
     "minimum_distance",
+    "minimum_time_to_collision",
     "nearest_pedestrian_distance",
     "never_spawned",
+    "path_irregularity",
     "path_length",
     "per_agent",
+    "repeated_collisions",
+    "social_work",
+    "space_compliance",
     "spawn_delay",
+    "spl",
+    "struck_standing",
     "success",
+    "time_not_moving",
     "time_under_way",
     "timed_out",
+    "zone_share",
 ]
 
 
@@ -82,12 +128,37 @@ def per_agent(episode: Episode) -> dict[str, NDArray[Any]]:
         "displacement": displacement(episode),
         "path_length": path_length(episode),
         "distance_to_displacement": distance_to_displacement(episode),
+        "spl": spl(episode),
+        "path_irregularity": path_irregularity(episode),
+        "failures_to_progress": failures_to_progress(episode),
         "average_speed": average_speed(episode),
+        "maximum_speed": maximum_speed(episode),
+        "mean_acceleration": mean_acceleration(episode),
+        "maximum_acceleration": maximum_acceleration(episode),
+        "mean_jerk": mean_jerk(episode),
+        "maximum_jerk": maximum_jerk(episode),
+        "time_not_moving": time_not_moving(episode),
         "intimate_intrusions": intimate_intrusions(episode),
         "intrusion_share": intrusion_share(episode),
         "minimum_distance": minimum_distance(episode),
+        "mean_distance": mean_distance(episode),
+        **{f"{zone}_zone_share": zone_share(episode, zone) for zone in ZONES},
+        "space_compliance": space_compliance(episode),
+        "minimum_time_to_collision": minimum_time_to_collision(episode),
+        "social_work": social_work(episode),
         "collisions_pedestrian": collisions(episode, Partner.PEDESTRIAN),
         "collisions_agent": collisions(episode, Partner.AGENT),
+        **{
+            f"collisions_{kind.name.lower()}_by_{who.name.lower()}": collisions_by_fault(episode, kind, who)
+            for kind in Partner
+            for who in Fault
+        },
         "first_partner": first_partner(episode),
+        "repeated_collisions": repeated_collisions(episode),
+        "struck_standing": struck_standing(episode),
+        "largest_closing_speed": largest_closing_speed(episode),
+        "largest_peak_force": largest_peak_force(episode),
+        "collision_impulse": collision_impulse(episode),
+        "collisions_over_limit": collisions_over_limit(episode),
         "spawn_delay": spawn_delay(episode),
     }

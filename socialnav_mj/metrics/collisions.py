@@ -24,7 +24,7 @@ def collisions(episode: Episode, partner: Partner | None = None) -> NDArray[np.i
     Returns:
         Shape (n_agents,); 0 for agents that never spawned.
     """
-    counted = _under_way(episode)
+    counted = counted_contacts(episode)
     if partner is not None:
         counted &= episode.contact_partner_kind == partner
     return np.bincount(episode.contact_agent[counted], minlength=episode.n_agents).astype(np.int64)
@@ -40,12 +40,20 @@ def first_partner(episode: Episode) -> NDArray[np.int64]:
         Values of `Partner`, or -1 for agents that touched nobody, shape (n_agents,).
     """
     result = np.full(episode.n_agents, NOBODY, dtype=np.int64)
-    counted = np.flatnonzero(_under_way(episode))
+    counted = np.flatnonzero(counted_contacts(episode))
     order = counted[np.lexsort((episode.contact_partner_kind[counted], episode.contact_time[counted]))]
     agents, first = np.unique(episode.contact_agent[order], return_index=True)
     result[agents] = episode.contact_partner_kind[order[first]]
     return result
 
 
-def _under_way(episode: Episode) -> NDArray[np.bool_]:
+def counted_contacts(episode: Episode) -> NDArray[np.bool_]:
+    """Which contacts are collisions of their agent: those that began before or at its end.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (k,).
+    """
     return episode.contact_time <= episode.agent_end_time[episode.contact_agent] + _SAME_TIME

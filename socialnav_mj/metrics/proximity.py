@@ -5,12 +5,14 @@ import numpy as np
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.navigation import active_steps
+from socialnav_mj.metrics.pairs import pairs, remember_last
 
 INTIMATE_DISTANCE = 1.2
 """Limit of the paper's "intimate space" [m]. In Hall's proxemics 1.2 m ends *personal* space (intimate: 0.45 m); we
 keep the paper's number and its name."""
 
 
+@remember_last
 def nearest_pedestrian_distance(episode: Episode) -> Array:
     """Distance from each agent to the nearest replayed pedestrian at every sample; other agents do not count.
 
@@ -18,17 +20,12 @@ def nearest_pedestrian_distance(episode: Episode) -> Array:
         episode: The record.
 
     Returns:
-        Shape (t, n_agents); inf where no pedestrian is in the scene, NaN where the agent is not [m].
+        Shape (t, n_agents), read-only; inf where no pedestrian is in the scene, NaN where the agent is not [m].
     """
-    result = np.full((len(episode.time), episode.n_agents), np.nan)
-    for i in range(episode.n_agents):
-        window = episode.window(i)
-        crowd = episode.pedestrian_position[window]
-        crowd = crowd[:, np.isfinite(crowd[..., 0]).any(axis=0)]
-        gap = crowd - episode.agent_position[window, i, None]
-        squared = np.einsum("tmd,tmd->tm", gap, gap)
-        squared[np.isnan(squared)] = np.inf
-        result[window, i] = np.sqrt(squared.min(axis=1, initial=np.inf))
+    near = pairs(episode)
+    result = np.where(np.isfinite(episode.agent_heading), np.inf, np.nan)
+    np.minimum.at(result, (near.step, near.agent), near.distance)
+    result.flags.writeable = False
     return result
 
 

@@ -1,0 +1,129 @@
+"""How fast and how smoothly agents move: speed, acceleration, jerk, standing still; from the logged velocities."""
+
+import numpy as np
+
+from socialnav_mj.episode import Episode
+from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.navigation import never_spawned
+from socialnav_mj.metrics.pairs import largest_over, mean_over
+
+STANDING_SPEED = 0.1
+"""Whoever is slower stands still [m/s]: a tenth of the robot's top speed, 16 times its steady tracking error (6 mm/s),
+and a motion of 2 cm in a control step."""
+
+
+def speed(episode: Episode) -> Array:
+    """Speed over ground.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (t, n_agents); NaN where the agent is not in the scene [m/s].
+    """
+    return np.linalg.norm(episode.agent_velocity, axis=-1)
+
+
+def acceleration(episode: Episode) -> Array:
+    """Length of the change of velocity from each sample to the next, over the control step: turning counts too.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (t - 1, n_agents); NaN where the agent is not at both samples [m/s^2].
+    """
+    return np.linalg.norm(np.diff(episode.agent_velocity, axis=0), axis=-1) / episode.control_timestep
+
+
+def jerk(episode: Episode) -> Array:
+    """Length of the second difference of velocity over the square of the control step.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (max(t - 2, 0), n_agents); NaN where the agent is not at all three samples [m/s^3].
+    """
+    return np.linalg.norm(np.diff(episode.agent_velocity, n=2, axis=0), axis=-1) / episode.control_timestep**2
+
+
+def maximum_speed(episode: Episode) -> Array:
+    """Largest speed from the spawn's sample to the end's; a push can make it larger than the robot's limit.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,); NaN for agents that never spawned [m/s].
+    """
+    return _largest(speed(episode))
+
+
+def mean_acceleration(episode: Episode) -> Array:
+    """Mean of `acceleration`; agents start from rest, people do not.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), >= 0; NaN for agents with fewer than 2 samples [m/s^2].
+    """
+    return _mean(acceleration(episode))
+
+
+def maximum_acceleration(episode: Episode) -> Array:
+    """Largest `acceleration`.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), >= 0; NaN for agents with fewer than 2 samples [m/s^2].
+    """
+    return _largest(acceleration(episode))
+
+
+def mean_jerk(episode: Episode) -> Array:
+    """Mean of `jerk`.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), >= 0; NaN for agents with fewer than 3 samples [m/s^3].
+    """
+    return _mean(jerk(episode))
+
+
+def maximum_jerk(episode: Episode) -> Array:
+    """Largest `jerk`.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), >= 0; NaN for agents with fewer than 3 samples [m/s^3].
+    """
+    return _largest(jerk(episode))
+
+
+def time_not_moving(episode: Episode) -> Array:
+    """Time on active steps that begin slower than `STANDING_SPEED`; every agent starts from rest, so its first counts.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), at most `time_under_way`; NaN for agents that never spawned [s].
+    """
+    standing = (speed(episode) < STANDING_SPEED) & episode.agent_active
+    return np.where(never_spawned(episode), np.nan, standing.sum(axis=0) * episode.control_timestep)
+
+
+def _mean(values: Array) -> Array:
+    return mean_over(values, np.isfinite(values))
+
+
+def _largest(values: Array) -> Array:
+    return largest_over(values, np.isfinite(values))
