@@ -1,14 +1,12 @@
 """The record of everything that happened in one episode; all that comes later is made from it alone."""
 
 import json
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,8 +146,10 @@ class Episode:
 
     def _check_values(self) -> None:
         n, m = len(self.agent_person), len(self.pedestrian_person)
-        if not np.all(np.isfinite(self.time)) or np.any(np.diff(self.time) <= 0.0):
-            raise EpisodeError("time must be finite and increasing")
+        if not len(self.time) or not np.all(np.isfinite(self.time)):
+            raise EpisodeError("time must be finite and hold a sample at least")
+        if not np.allclose(np.diff(self.time), self._stated_timestep(), rtol=0.0, atol=_SAME_TIME):
+            raise EpisodeError(f"time must be spaced by the control time step of {self.control_timestep} s")
         for name in ("agent_person", "pedestrian_person"):
             if np.any(np.diff(getattr(self, name)) <= 0):
                 raise EpisodeError(f"{name} must be ascending and unique")
@@ -166,14 +166,39 @@ class Episode:
             raise EpisodeError("contact_agent is out of range")
         if np.any((self.contact_partner < 0) | (self.contact_partner >= limit)):
             raise EpisodeError("contact_partner is out of range")
-        spawned = np.isfinite(self.agent_spawn_time)
-        if not np.array_equal(spawned, self.agent_outcome != Outcome.NEVER_SPAWNED):
-            raise EpisodeError("agent_spawn_time must be NaN for exactly the agents that never spawned")
-        present = np.isfinite(self.agent_position[..., 0])
-        after = self.time[:, None] >= self.agent_spawn_time - 1e-9
-        before = self.time[:, None] <= self.agent_end_time + 1e-9
-        if not np.array_equal(present, after & before):
-            raise EpisodeError("agent_position must be finite from spawn to end, and NaN elsewhere")
+        own = (self.contact_partner_kind == Partner.AGENT) & (self.contact_partner == self.contact_agent)
+        if own.any():
+            raise EpisodeError("contact_partner of an agent is the agent itself")
+        order = np.lexsort((self.contact_partner, self.contact_partner_kind, self.contact_agent, self.contact_time))
+        if not np.isfinite(self.contact_time).all() or np.any(np.diff(order) < 0):
+            raise EpisodeError("contacts must have a finite time and be ordered by time, agent, partner kind, partner")
+        self._check_presence()
+
+    def _check_presence(self) -> None:
+        spawned = self.agent_outcome != Outcome.NEVER_SPAWNED
+        for name in ("agent_spawn_time", "agent_end_time"):
+            if not np.array_equal(spawned, np.isfinite(getattr(self, name))):
+                raise EpisodeError(f"{name} must be NaN for exactly the agents that never spawned")
+        if np.any(self.agent_end_time < self.agent_spawn_time):
+            raise EpisodeError("agent_end_time must not be before agent_spawn_time")
+        after = self.time[:, None] >= self.agent_spawn_time - _SAME_TIME
+        before = self.time[:, None] <= self.agent_end_time + _SAME_TIME
+        for name in ("agent_position", "agent_heading", "agent_velocity", "agent_yaw_rate"):
+            if not _is_finite_where(getattr(self, name), after & before):
+                raise EpisodeError(f"{name} must be finite from spawn to end, and NaN elsewhere")
+        under_way = after & (self.time[:, None] < self.agent_end_time - _SAME_TIME)
+        if not np.array_equal(self.agent_policy >= 0, under_way):
+            raise EpisodeError("agent_policy must be -1 except from the spawn up to, not including, the end")
+        there = np.isfinite(self.pedestrian_heading)
+        for name in ("pedestrian_position", "pedestrian_velocity"):
+            if not _is_finite_where(getattr(self, name), there):
+                raise EpisodeError(f"{name} must be finite where pedestrian_heading is, and NaN elsewhere")
+
+    def _stated_timestep(self) -> float:
+        try:
+            return self.control_timestep
+        except (KeyError, TypeError, ValueError) as error:
+            raise EpisodeError("metadata lack scenario.control_timestep") from error
 
     @property
     def n_agents(self) -> int:
@@ -281,9 +306,20 @@ def _reading(path: str | Path) -> Iterator[tuple[Any, dict[str, Any]]]:
             yield file, header
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, BadZipFile, zlib.error) as error:
+    except Exception as error:
+        # Damage makes zipfile, zlib and numpy raise nearly anything, NotImplementedError and struct.error included.
         raise EpisodeError(f"{path} is not a readable episode: {error}") from error
 
+
+def _is_finite_where(values: Array, expected: NDArray[np.bool_]) -> bool:
+    """Whether values (..., or with a last axis of two coordinates) are finite where expected and NaN elsewhere."""
+    if values.ndim > expected.ndim:
+        expected = np.broadcast_to(expected[..., None], values.shape)
+    return np.array_equal(np.isfinite(values), expected) and np.array_equal(np.isnan(values), ~expected)
+
+
+_SAME_TIME = 1e-6
+"""Times this near are the same; rounding of sums of time steps [s]."""
 
 _INTEGER_FIELDS = {
     "agent_person",

@@ -196,8 +196,8 @@ def contact_columns(rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
         Keyword arguments of `Episode`, ordered by time, agent, partner.
     """
     rows = sorted(rows, key=lambda row: row[:4])
-    names = "time agent partner_kind partner normal agent_heading agent_velocity partner_velocity duration".split()
-    names += ["position", "impulse", "peak_force"]
+    names = ["time", "agent", "partner_kind", "partner", "normal", "agent_heading", "agent_velocity"]
+    names += ["partner_velocity", "duration", "position", "impulse", "peak_force"]
     shapes = {"normal": 2, "agent_velocity": 2, "partner_velocity": 2, "position": 2}
     columns = list(zip(*rows, strict=True)) if rows else [()] * len(names)
     result: dict[str, NDArray[Any]] = {}
