@@ -1,6 +1,7 @@
 """Controllers by name: the built-in ones, those of installed packages, and any class by its path."""
 
 import ast
+import json
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -64,12 +65,20 @@ def controller_config(controller: Controller) -> dict[str, Any]:
         controller: A dataclass, or anything.
 
     Returns:
-        The fields of a dataclass, and the class; for others the class alone.
+        The fields of a dataclass, and the class; for others the class alone. JSON values, as they are read back.
+
+    Raises:
+        ValueError: If a field is no JSON value.
     """
     kind = type(controller)
     result: dict[str, Any] = {"class": f"{kind.__module__}:{kind.__qualname__}"}
-    if is_dataclass(controller):
-        result |= {field.name: getattr(controller, field.name) for field in fields(controller)}
+    names = [field.name for field in fields(controller) if field.init] if is_dataclass(controller) else []
+    for name in names:
+        value = getattr(controller, name)
+        try:
+            result[name] = json.loads(json.dumps(value, allow_nan=False))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{result['class']}.{name} = {value!r} is not allowed; allowed: JSON values") from error
     return result
 
 
@@ -79,30 +88,38 @@ def _parse(spec: str) -> tuple[str, dict[str, Any]]:
         return spec, {}
     try:
         call = ast.parse(f"f({rest}", mode="eval").body
-        if not isinstance(call, ast.Call) or call.args:
-            raise ValueError("only keyword arguments are allowed")
-        return name, {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords if keyword.arg}
-    except (SyntaxError, ValueError) as error:
-        raise ValueError(
-            f"controller {spec!r} cannot be read: {error}; expected name or name(key=literal, ...)"
-        ) from None
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and not call.args:
+            return name, {str(keyword.arg): ast.literal_eval(keyword.value) for keyword in call.keywords}
+    except (SyntaxError, ValueError):
+        pass
+    raise ValueError(
+        f"controller {spec!r} cannot be read; expected name or name(key=value, ...), with numbers, quoted strings, "
+        "True, False, None or lists of these as values"
+    )
 
 
 def _factory(name: str) -> Callable[..., Controller]:
     if name in BUILT_IN:
         return BUILT_IN[name]
     if ":" in name:
-        module_name, _, attribute = name.partition(":")
-        try:
-            factory: Callable[..., Controller] = getattr(import_module(module_name), attribute)
-        except (ImportError, AttributeError) as error:
-            raise ValueError(f"controller {name!r} cannot be imported: {error}") from error
-        return factory
+        return _load(name, name)
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         if entry.name == name:
-            offered: Callable[..., Controller] = entry.load()
-            return offered
+            return _load(name, entry.value)
     raise ValueError(f"unknown controller {name!r}; available: {', '.join(available())}, or package.module:Class")
+
+
+def _load(name: str, path: str) -> Callable[..., Controller]:
+    module_name, _, attribute = path.partition(":")
+    try:
+        factory: Callable[..., Controller] = getattr(import_module(module_name), attribute)
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise ValueError(
+            f"controller {name!r} cannot be imported from {path!r}: {error}; expected package.module:Class"
+        ) from error
+    if not callable(factory):
+        raise ValueError(f"controller {name!r} is a {type(factory).__name__}; expected a class, or a function")
+    return factory
 
 
 __all__ = [

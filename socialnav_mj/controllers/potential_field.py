@@ -1,6 +1,7 @@
 """Potential field (paper section III-B; Khatib 1986, doi 10.1177/027836498600500106)."""
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,12 @@ def speed_and_turn(force: Array) -> tuple[Array, Array]:
     return speed, turn
 
 
+def _require_number(name: str, given: object, *, zero_allowed: bool, or_else: str = "") -> None:
+    if isinstance(given, (int, float)) and isfinite(given) and (given > 0 or (zero_allowed and given == 0)):
+        return
+    raise ValueError(f"{name} = {given!r} is not allowed; allowed: numbers {'>=' if zero_allowed else '>'} 0{or_else}")
+
+
 @dataclass(kw_only=True)
 class PotentialField(TwistController):
     """Attraction to the goal and repulsion from everybody near, pedestrians and agents alike.
@@ -105,12 +112,11 @@ class PotentialField(TwistController):
     name: str = "potential_field"
 
     def __post_init__(self) -> None:
-        if not self.influence_distance > 0.0:
-            raise ValueError(f"influence_distance = {self.influence_distance} is not allowed; allowed: numbers > 0")
-        if not self.repulsion_gain >= 0.0:
-            raise ValueError(f"repulsion_gain = {self.repulsion_gain} is not allowed; allowed: numbers >= 0")
-        if self.attraction_limit is not None and not self.attraction_limit > 0.0:
-            raise ValueError(f"attraction_limit = {self.attraction_limit} is not allowed; allowed: numbers > 0, None")
+        for name in ("position_gain", "velocity_gain", "repulsion_gain"):
+            _require_number(name, getattr(self, name), zero_allowed=True)
+        _require_number("influence_distance", self.influence_distance, zero_allowed=False)
+        if self.attraction_limit is not None:
+            _require_number("attraction_limit", self.attraction_limit, zero_allowed=False, or_else=", None")
 
     def force(self, observation: Observation) -> Array:
         """Total force in the agent's frame (paper eq 6).

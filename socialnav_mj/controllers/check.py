@@ -1,0 +1,93 @@
+"""Whether a controller keeps the protocol, tried on made-up observations without a simulator."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from socialnav_mj.config import Scenario
+from socialnav_mj.controllers import controller_config
+from socialnav_mj.controllers.base import Controller, Limits, Observation
+from socialnav_mj.geometry import Array
+from socialnav_mj.observation import observe
+
+
+def check_controller(controller: Controller, *, seed: int = 0) -> None:
+    """Run a controller on observations of an empty, a lonely, a crowded and a degenerate scene.
+
+    Args:
+        controller: As it would be evaluated; it is reset.
+        seed: Of the scenes and of the controller.
+
+    Raises:
+        ValueError: If something is wrong; says what, in which scene, and what is expected.
+    """
+    limits = Limits.of(Scenario())
+    if not isinstance(controller, Controller) or not isinstance(controller.name, str) or not controller.name:
+        raise ValueError(f"{type(controller).__name__} lacks reset, act, or a name that is a string and not empty")
+    controller_config(controller)
+    actions = []
+    for _ in range(2):
+        controller.reset(limits, seed=seed)
+        actions.append([_checked_action(controller, scene, seen) for scene, seen in _scenes(seed)])
+    for (scene, _), one, two in zip(_scenes(seed), *actions, strict=True):
+        if not np.array_equal(one, two):
+            raise ValueError(f"in the {scene} scene, after a reset with the same seed, act returns something else")
+
+
+def _checked_action(controller: Controller, scene: str, observation: Observation) -> Array:
+    given = {key: value.copy() for key, value in observation.items()}
+    returned = controller.act(observation)
+    active = given["active"]
+    shape = (len(active), 2)
+    try:
+        action = np.array(returned, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"in the {scene} scene, act returns a {type(returned).__name__}; expected an array of shape {shape}"
+        ) from None
+    if action.shape != shape:
+        raise ValueError(f"in the {scene} scene, act returns shape {action.shape}; expected {shape}: (left, right)")
+    if not np.isfinite(action[active]).all():
+        raise ValueError(f"in the {scene} scene, act returns {action[active].tolist()}; expected finite wheel speeds")
+    if changed := [key for key, value in observation.items() if not np.array_equal(value, given[key])]:
+        raise ValueError(f"in the {scene} scene, act changes observation[{changed[0]!r}]; expected it to be only read")
+    policies = tuple(getattr(controller, "policies", (controller.name,)))
+    policy = getattr(controller, "active_policy", None)
+    if policy is not None and (
+        np.shape(policy) != shape[:1] or not np.isin(np.asarray(policy)[active], np.arange(len(policies))).all()
+    ):
+        raise ValueError(
+            f"in the {scene} scene, active_policy is {policy}; expected shape {shape[:1]} with indices into {policies}"
+        )
+    action[~active] = 0.0
+    return action
+
+
+def _scenes(seed: int) -> Iterator[tuple[str, Observation]]:
+    random = np.random.default_rng(seed)
+    yield "empty", _observation(np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((3, 2)), active=0, present=0)
+    yield "lonely", _observation(np.zeros((4, 2)), np.full((4, 2), 5.0), np.zeros((3, 2)), active=1, present=0)
+    for _ in range(5):
+        places = random.uniform(-3.0, 3.0, (3, 12, 2))
+        yield "crowded", _observation(*places, active=10, present=9)
+    # Everybody at the same place, nobody moves, and the goal is there too.
+    yield "degenerate", _observation(np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((3, 2)), active=4, present=3)
+
+
+def _observation(position: Array, goal: Array, crowd: Array, *, active: int, present: int) -> Observation:
+    """Agents at positions, people who walk towards the origin; the first so many of each are there."""
+    n = len(position)
+    moving = not np.array_equal(position, goal)
+    heading = np.arctan2(goal[:, 1], goal[:, 0])
+    return observe(
+        active=np.arange(n) < active,
+        person=np.arange(n),
+        position=position,
+        heading=heading,
+        velocity=0.5 * moving * np.stack([np.cos(heading), np.sin(heading)], axis=1),
+        yaw_rate=np.zeros(n),
+        goal=goal,
+        pedestrian_position=crowd,
+        pedestrian_velocity=-0.3 * crowd,
+        pedestrian_slots=np.arange(present),
+    )
