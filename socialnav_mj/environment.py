@@ -1,11 +1,12 @@
 """From keyword arguments to a scenario, and from a scenario to a dm_control environment."""
 
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from dm_control.rl import control
+from dm_env import specs
 
 from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
 from socialnav_mj.physics import Physics
@@ -52,6 +53,18 @@ def make_scenario(
     )
 
 
+class Environment(control.Environment):
+    """A dm_control environment with one reward a slot; dm_control's own specifies a single number."""
+
+    def reward_spec(self) -> specs.Array:
+        """One reward a slot.
+
+        Returns:
+            Shape (n_slots,).
+        """
+        return self.task.reward_spec(self.physics)
+
+
 def make_environment(
     *,
     share: float,
@@ -67,7 +80,7 @@ def make_environment(
     time_limit: float = float("inf"),
     random: int | np.random.RandomState | None = None,
     environment_kwargs: dict[str, Any] | None = None,
-) -> control.Environment:
+) -> Environment:
     """A scenario as a dm_control environment.
 
     Args:
@@ -86,7 +99,7 @@ def make_environment(
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
 
     Returns:
-        An environment whose task is a `CrowdTask`.
+        An environment whose task is a `CrowdTask` and whose physics is a `Physics`.
 
     Raises:
         ValueError: If a value is not allowed, or seed and an integer random are both given.
@@ -94,6 +107,8 @@ def make_environment(
     """
     if isinstance(random, Integral) and seed is not None:
         raise ValueError(f"seed = {seed} and random = {random} are both given; they name the same thing, give one")
+    if not (isinstance(time_limit, Real) and time_limit > 0.0):
+        raise ValueError(f"time_limit = {time_limit!r} is not allowed; allowed: numbers > 0")
     scenario = make_scenario(
         share=share,
         seed=random if isinstance(random, Integral) else 0 if seed is None else seed,
@@ -115,7 +130,7 @@ def make_environment(
         low=everywhere.min(axis=0),
         high=everywhere.max(axis=0),
     )
-    return control.Environment(
+    return Environment(
         Physics.from_mujoco(model, rearm_time=scenario.contact_rearm_time),
         task,
         control_timestep=scenario.control_timestep,

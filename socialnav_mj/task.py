@@ -128,8 +128,11 @@ class CrowdTask(base.Task):
         shape = (self.cast.n_agent_slots, 2)
         return specs.BoundedArray(shape, float, minimum=corners.min(), maximum=corners.max(), name="wheel_speed")
 
-    def get_reward_spec(self) -> specs.Array:
+    def reward_spec(self, physics: Physics) -> specs.Array:
         """One reward a slot.
+
+        Args:
+            physics: Not used.
 
         Returns:
             Shape (n_slots,).

@@ -70,7 +70,7 @@ def load(
     """
     if task_name not in SUITE:
         raise ValueError(f"unknown task {task_name!r}; available: {', '.join(ALL_TASKS)}")
-    allowed = inspect.signature(make_environment).parameters
+    allowed = [name for name in inspect.signature(make_environment).parameters if name != "environment_kwargs"]
     if unknown := sorted(set(task_kwargs or {}) - set(allowed)):
         raise ValueError(f"unknown task_kwargs {', '.join(unknown)}; available: {', '.join(allowed)}")
     environment = SUITE[task_name](**(task_kwargs or {}), environment_kwargs=environment_kwargs)

@@ -1,0 +1,106 @@
+"""The assembled scene: names, limits, cameras, and a robot file that contradicts the configuration."""
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from socialnav_mj.config import Robot, Scenario
+from socialnav_mj.resources import assets_folder
+from socialnav_mj.scene import agent_name, build_model, pedestrian_name
+
+LOW, HIGH = np.array([-2.0, 3.0]), np.array([6.0, 9.0])
+
+
+def model_of(scenario: Scenario | None = None, n_agents: int = 3, n_pedestrians: int = 2) -> Any:
+    return build_model(
+        scenario or Scenario(), n_agent_slots=n_agents, n_pedestrian_slots=n_pedestrians, low=LOW, high=HIGH
+    )
+
+
+def test_names_of_slots_sort_as_their_indices() -> None:
+    assert (agent_name(7), pedestrian_name(123)) == ("agent_007/", "pedestrian_123/")
+    names = [agent_name(i) for i in range(200)]
+    assert names == sorted(names)
+
+
+def test_scenario_decides_radii_limits_and_time_step() -> None:
+    scenario = Scenario(robot=Robot(radius=0.2, max_speed=0.7), pedestrian_radius=0.1, turn_limit="per_second")
+    model = model_of(scenario)
+    assert model.opt.timestep == 0.01
+    for slot in range(3):
+        assert model.geom(agent_name(slot) + "bumper").size[0] == 0.2
+        np.testing.assert_allclose(model.actuator(agent_name(slot) + "forward").ctrlrange, [0.0, 0.7])
+        limit = np.pi / 6.0
+        np.testing.assert_allclose(model.actuator(agent_name(slot) + "yaw").ctrlrange, [-limit, limit])
+    assert model.actuator_ctrllimited.all()
+    for slot in range(2):
+        assert model.geom(pedestrian_name(slot) + "body").size[0] == 0.1
+    assert (model.nmocap, model.nu, model.nv) == (2, 6, 24)
+
+
+def test_robots_are_equal_but_for_their_names_and_wait_apart() -> None:
+    model = model_of(n_agents=40, n_pedestrians=40)
+    for field in ("body_mass", "body_inertia"):
+        values = getattr(model, field)
+        blocks = [values[model.body(agent_name(i) + "robot").id :][:3] for i in range(40)]
+        assert all(np.array_equal(block, blocks[0]) for block in blocks)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert not (data.contact.geom > 0).all(axis=1).any()  # nothing but robots on the floor
+
+
+def test_parked_robots_can_float_and_invalid_states_are_not_reset() -> None:
+    model = model_of()
+    assert model.ngravcomp == 3 * 3  # switched off in model fields later; MuJoCo skips it if it is zero when compiled
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
+def test_cameras_see_the_whole_crowd_and_one_follows_each_agent() -> None:
+    model = model_of()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    names = [model.camera(i).name for i in range(model.ncam)]
+    assert {"top", "oblique", "agent_000/follow", "agent_002/follow"} <= set(names)
+    corners = np.array([[x, y, z] for x in (LOW[0], HIGH[0]) for y in (LOW[1], HIGH[1]) for z in (0.0, 1.7)])
+    top = model.camera("top").id
+    assert np.abs((corners - data.cam_xpos[top])[:, :2]).max() <= 0.5 * model.cam_fovy[top]
+    oblique = model.camera("oblique").id
+    seen = (corners - data.cam_xpos[oblique]) @ data.cam_xmat[oblique].reshape(3, 3)
+    height = np.tan(np.radians(0.5 * model.cam_fovy[oblique]))
+    assert (seen[:, 2] < 0.0).all()
+    assert np.abs(seen[:, 1] / seen[:, 2]).max() < height
+    assert np.abs(seen[:, 0] / seen[:, 2]).max() < height * 4.0 / 3.0  # of a 4:3 picture
+    for slot in range(3):
+        camera = model.camera(agent_name(slot) + "follow")
+        assert model.cam_bodyid[camera.id] == model.body(agent_name(slot) + "robot").id
+
+
+def test_robot_file_that_does_not_exist_is_named() -> None:
+    with pytest.raises(FileNotFoundError, match=r"Robot.model = 'tank.xml': there is no file .*tank\.xml"):
+        model_of(Scenario(robot=Robot(model="tank.xml")))
+
+
+@pytest.mark.parametrize(
+    ("robot", "message"),
+    [
+        ({"track": 0.3}, r"robot.xml: track is 0\.24, but the Robot configuration says 0\.3"),
+        ({"wheel_radius": 0.05}, r"robot.xml: wheel_radius is 0\.06, but the Robot configuration says 0\.05"),
+    ],
+)
+def test_configuration_that_contradicts_the_robot_file_is_refused(robot: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        model_of(Scenario(robot=Robot(**robot)))
+
+
+def test_another_robot_is_read_from_its_file_and_its_tendons_are_checked(tmp_path: Path) -> None:
+    text = (assets_folder() / "robot.xml").read_text()
+    good, bad = tmp_path / "heavy.xml", tmp_path / "bad.xml"
+    good.write_text(text.replace('mass="7.4"', 'mass="9.4"'))
+    bad.write_text(text.replace('coef="-0.25"', 'coef="0.25"'))
+    model = model_of(Scenario(robot=Robot(model=str(good))))
+    assert model.body_subtreemass[model.body("agent_001/robot").id] == pytest.approx(10.0)
+    with pytest.raises(ValueError, match=r"yaw tendon's left_wheel coefficient is 0\.25, but"):
+        model_of(Scenario(robot=Robot(model=str(bad))))
