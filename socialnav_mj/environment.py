@@ -131,7 +131,7 @@ def make_environment(
         high=everywhere.max(axis=0),
     )
     return Environment(
-        Physics.from_mujoco(model, rearm_time=scenario.contact_rearm_time),
+        Physics.from_mujoco(model),
         task,
         control_timestep=scenario.control_timestep,
         time_limit=time_limit,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.episode import IntArray, Partner
 from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
-from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, agent_name, pedestrian_name
+from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, REARM_TIME, agent_name, pedestrian_name
 
 _PARKING_DEPTH = 20.0
 """How far below the floor bodies wait that are not in the scene [m]."""
@@ -54,24 +54,20 @@ class Physics(MujocoPhysics):
 
     Every body is in a slot, and a slot is either in use or parked below the floor, out of contact. Mocap poses are
     written and contacts read at every physics step. All getters return arrays that the caller owns, one row a slot.
+    A copy has the same state, but has seen no touches yet.
     """
 
-    rearm_time: float = 0.2
-    """Two bodies must have been apart this long before their next touch counts as new [s]."""
-
     @classmethod
-    def from_mujoco(cls, model: mujoco.MjModel, *, rearm_time: float) -> "Physics":
+    def from_mujoco(cls, model: mujoco.MjModel) -> "Physics":
         """Physics of a model of `scene.build_model`.
 
         Args:
             model: The compiled scene.
-            rearm_time: Time apart after which a touch counts as new [s].
 
         Returns:
             The physics with every slot parked.
         """
         physics = cls(MjData(MjModel(model)))
-        physics.rearm_time = rearm_time
         with physics.reset_context():
             pass
         return physics
@@ -99,7 +95,8 @@ class Physics(MujocoPhysics):
         self._pedestrian_geom = np.array(
             [model.geom(pedestrian_name(i) + "body").id for i in range(self.n_pedestrians)]
         )
-        self._bits = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
+        self._bits = np.array(model.geom_user[:, :2], dtype=np.int32)
+        self._rearm_time = float(model.numeric(REARM_TIME).data[0])
         self._owner = np.full(model.ngeom, -1, dtype=np.int64)
         for slot in range(self.n_agents):
             self._owner[model.geom(agent_name(slot) + "bumper").id] = slot
@@ -353,7 +350,7 @@ class Physics(MujocoPhysics):
             forces[key] = forces.get(key, 0.0) + float(self._force[0])
             touch = self._touches.get(key)
             # Contacts are found at the beginning of a step; the gap is between the last end and this beginning.
-            if touch is None or time - touch.last_time - timestep >= self.rearm_time - 1e-9:
+            if touch is None or time - touch.last_time - timestep >= self._rearm_time - 1e-9:
                 touch = self._begin_touch(key, int(i), time, flip=pairs[i, 0] != key[0], path_velocity=path_velocity)
                 self._touches[key] = touch
                 self._new_touches.append(touch)

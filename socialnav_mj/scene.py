@@ -12,6 +12,8 @@ from socialnav_mj.resources import assets_folder
 
 AGENT_PREFIX = "agent_"
 PEDESTRIAN_PREFIX = "pedestrian_"
+REARM_TIME = "contact_rearm_time"
+"""Name of the model's number that says how long two bodies must be apart before a touch counts as new [s]."""
 _TOLERANCE = 1e-6
 
 
@@ -76,6 +78,11 @@ def build_model(
         person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
         person.geom("body").size[0] = scenario.pedestrian_radius
         arena.attach(person, prefix=pedestrian_name(slot), frame=_apart(arena, slot, row=1))
+    # What a slot needs that is in use, and when touches count: a copy of the physics has only the model to read.
+    arena.nuser_geom = 2
+    for geom in arena.geoms:
+        geom.userdata = [geom.contype, geom.conaffinity]
+    arena.add_numeric(name=REARM_TIME, data=[scenario.contact_rearm_time], size=1)
     model = arena.compile()
     _check_robot(model, scenario.robot)
     return model

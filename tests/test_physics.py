@@ -1,6 +1,7 @@
 """What is true: contacts, their pairs, velocities and impulses, and what happens to an invalid state."""
 
 import os
+import pickle
 from math import ceil
 
 import numpy as np
@@ -32,7 +33,7 @@ def physics_of(n_agents: int = 1, n_pedestrians: int = 1, *, slippery: bool = Fa
         model.actuator_biasprm[:] = 0.0
         wheels = [g for g in range(model.ngeom) if model.geom(g).name.endswith("_wheel")]
         model.geom_friction[wheels] = 1e-4
-    physics = Physics.from_mujoco(model, rearm_time=scenario.contact_rearm_time)
+    physics = Physics.from_mujoco(model)
     with physics.reset_context():
         for slot in range(n_agents):
             physics.place_agent(slot, np.array([0.0, 3.0 * slot]), 0.0)
@@ -67,20 +68,25 @@ def flicker(physics: Physics, *phases: tuple[bool, int]) -> list[Touch]:
 # Touches
 
 
-def test_head_on_touch_of_a_walker_has_the_figures_of_hand_calculation() -> None:
-    # A robot stands at the origin facing +x; somebody comes from x = 3 m at 1.3 m/s. They touch 0.32 m apart.
-    environment = environment_of(walk([(0, 0), (10, 0)], 1.0), walk([(3, 0), (-3, 0)], 1.3), agents=[1])
+@pytest.mark.parametrize("control_timestep", [0.1, 0.2])
+@pytest.mark.parametrize(("robot", "person"), [(0.17, 0.15), (0.25, 0.15), (0.17, 0.08)])
+def test_head_on_touch_of_a_walker_has_the_figures_of_hand_calculation(
+    robot: float, person: float, control_timestep: float
+) -> None:
+    # A robot stands at the origin facing +x; somebody comes from x = 3 m at 1.3 m/s. They touch at the sum of radii.
+    sizes = {"robot_radius": robot, "pedestrian_radius": person, "control_timestep": control_timestep}
+    environment = environment_of(walk([(0, 0), (10, 0)], 1.0), walk([(3, 0), (-3, 0)], 1.3), agents=[1], **sizes)
     environment.reset()
     while not environment.task.collisions:
         environment.step(still(environment))
     (collision,) = environment.task.collisions
     touch = collision.touch
-    time = ceil((3.0 - CONTACT_DISTANCE) / 1.3 / TIMESTEP) * TIMESTEP  # the first physics step within the distance
+    time = ceil((3.0 - robot - person) / 1.3 / TIMESTEP) * TIMESTEP  # the first physics step within the distance
     walker = 3.0 - 1.3 * time
     assert touch.kind == Partner.PEDESTRIAN and (collision.agent, collision.partner) == (0, 0)
     assert touch.time == pytest.approx(time, abs=1e-9)
     np.testing.assert_allclose(touch.normal, [1.0, 0.0], atol=1e-4)
-    np.testing.assert_allclose(touch.position, [0.5 * (0.17 + walker - 0.15), 0.0], atol=2e-4)
+    np.testing.assert_allclose(touch.position, [0.5 * (robot + walker - person), 0.0], atol=2e-4)
     np.testing.assert_allclose(touch.agent_velocity, [0.0, 0.0], atol=1e-4)
     np.testing.assert_allclose(touch.partner_velocity, [-1.3, 0.0], atol=1e-9)
     assert (touch.agent_velocity - touch.partner_velocity) @ touch.normal == pytest.approx(1.3, abs=1e-4)
@@ -236,7 +242,7 @@ def test_path_of_the_wrong_length_is_refused() -> None:
 def test_new_physics_and_reset_have_every_slot_parked() -> None:
     physics = physics_of(n_agents=3, n_pedestrians=2)
     physics.step(10)
-    fresh = Physics.from_mujoco(physics.model.ptr, rearm_time=0.2)
+    fresh = Physics.from_mujoco(physics.model.ptr)
     for parked in (fresh, physics):
         parked.reset()
         assert not parked.model.geom_contype.any() and not parked.model.geom_conaffinity[1:].any()
@@ -245,6 +251,20 @@ def test_new_physics_and_reset_have_every_slot_parked() -> None:
     physics.step(100)
     np.testing.assert_array_equal(physics.data.qpos, before)  # they need no floor
     assert physics.data.ncon == 0
+
+
+def test_copy_goes_on_as_the_original_and_its_slots_can_be_used_again() -> None:
+    original = physics_of(n_agents=2)
+    original.park_agent(1)
+    original.set_twist(np.array([[0.5, 1.0], [0.0, 0.0]]))
+    original.step(20)
+    for copy in (original.copy(), pickle.loads(pickle.dumps(original))):
+        np.testing.assert_array_equal(copy.get_state(), original.get_state())
+        copy.place_agent(1, np.array([0.0, 3.0]), 0.0)
+        copy.step(50)
+        assert abs(copy.data.qpos[9 + 2]) < 0.001  # stands on the floor
+        assert original.data.qpos[9 + 2] < -1.0
+        assert len(flicker(copy, (True, 5), (False, 19), (True, 5))) == 1
 
 
 # Invalid states

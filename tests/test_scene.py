@@ -41,6 +41,14 @@ def test_scenario_decides_radii_limits_and_time_step() -> None:
     assert (model.nmocap, model.nu, model.nv) == (2, 6, 24)
 
 
+def test_model_carries_the_contact_rules_that_slots_and_touches_need() -> None:
+    model = model_of(Scenario(contact_rearm_time=0.5))
+    assert model.numeric("contact_rearm_time").data.tolist() == [0.5]
+    np.testing.assert_array_equal(model.geom_user, np.stack([model.geom_contype, model.geom_conaffinity], axis=1))
+    np.testing.assert_array_equal(model.geom_user[model.geom("agent_001/bumper").id], [2, 6])
+    np.testing.assert_array_equal(model.geom_user[model.geom("pedestrian_001/body").id], [4, 0])
+
+
 def test_robots_are_equal_but_for_their_names_and_wait_apart() -> None:
     model = model_of(n_agents=40, n_pedestrians=40)
     for field in ("body_mass", "body_inertia"):
