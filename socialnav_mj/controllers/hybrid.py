@@ -1,0 +1,114 @@
+"""The mixed policy (paper section III-C): one controller near people, another elsewhere."""
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.controllers.base import Limits, Observation, TwistController
+from socialnav_mj.geometry import Array
+
+Who = Literal["pedestrians", "anyone"]
+
+
+def nearest_distance(observation: Observation, *, who: Who) -> Array:
+    """Distance from each agent to whoever is nearest.
+
+    Args:
+        observation: See `socialnav_mj.observation`.
+        who: Replayed pedestrians, or other agents as well.
+
+    Returns:
+        Between centres, shape (n_agents,), infinite where there is nobody [m].
+    """
+    kinds = ("pedestrian",) if who == "pedestrians" else ("pedestrian", "agent")
+    result = np.full(len(observation["active"]), np.inf)
+    for kind in kinds:
+        position = observation[f"{kind}_position"]
+        distance = np.hypot(position[..., 0], position[..., 1])
+        distance = np.where(observation[f"{kind}_mask"], distance, np.inf)
+        result = np.minimum(result, distance.min(axis=1, initial=np.inf))
+    return result
+
+
+@dataclass(kw_only=True)
+class Hybrid(TwistController):
+    """Acts as `near` while a pedestrian is nearer than the switch distance, else as `far`.
+
+    The paper's text speaks of the nearest pedestrian; its figures are only possible if other agents do not count, so
+    that is the default. At exactly the switch distance `far` acts: the paper says "below".
+    """
+
+    near: str = "replay_irl"
+    """Controller near people, as `make_controller` takes it."""
+    far: str = "potential_field"
+    """Controller elsewhere."""
+    switch_distance: float = 2.0
+    """[m]"""
+    who: Who = "pedestrians"
+    """Whose distance counts: replayed pedestrians, or "anyone"."""
+    hysteresis: float = 0.0
+    """Once `near` acts, it does so until everybody is farther than switch_distance + hysteresis [m]."""
+    name: str = "hybrid"
+    _controllers: tuple[TwistController, TwistController] = field(init=False, repr=False)
+    _acting: NDArray[np.int64] = field(init=False, repr=False)
+    _person: NDArray[np.int64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        from socialnav_mj.controllers import make_controller
+
+        if self.who not in get_args(Who):
+            raise ValueError(f"who = {self.who!r} is not allowed; allowed: {', '.join(get_args(Who))}")
+        for name in ("switch_distance", "hysteresis"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r} is not allowed; allowed: numbers >= 0")
+        parts = []
+        for name in ("near", "far"):
+            controller = make_controller(getattr(self, name))
+            if not isinstance(controller, TwistController):
+                raise ValueError(f"{name} = {getattr(self, name)!r} is no TwistController and cannot be mixed")
+            parts.append(controller)
+        self._controllers = (parts[0], parts[1])
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """Names of the two controllers, near first."""
+        return tuple(controller.name for controller in self._controllers)
+
+    @property
+    def active_policy(self) -> NDArray[np.int64]:
+        """0 where the near controller chose the last action, 1 where the far one did, shape (n_agents,)."""
+        return self._acting.copy()
+
+    def reset(self, limits: Limits, *, seed: int = 0) -> None:
+        """Take the limits of the episode to come.
+
+        Args:
+            limits: Of the scenario's robots.
+            seed: For controllers that draw random numbers.
+        """
+        super().reset(limits, seed=seed)
+        for controller in self._controllers:
+            controller.reset(limits, seed=seed)
+        self._acting = np.zeros(0, dtype=np.int64)
+        self._person = np.zeros(0, dtype=np.int64)
+
+    def twist(self, observation: Observation) -> Array:
+        """Twist of whichever controller is in charge of each agent.
+
+        Args:
+            observation: See `socialnav_mj.observation`.
+
+        Returns:
+            Shape (n_agents, 2) [m/s], [rad/s].
+        """
+        distance = nearest_distance(observation, who=self.who)
+        limit = np.full(len(distance), self.switch_distance)
+        if self.hysteresis and len(self._acting) == len(distance):
+            # A slot that holds another person than before starts anew.
+            limit += self.hysteresis * ((self._acting == 0) & (self._person == observation["person"]))
+        self._acting = np.where(distance < limit, 0, 1)
+        self._person = observation["person"].copy()
+        near, far = (controller.twist(observation) for controller in self._controllers)
+        return np.where((self._acting == 0)[:, None], near, far)

@@ -1,0 +1,168 @@
+"""The learned policy (paper section III-A): a trained SAC actor in numpy, without torch."""
+
+import json
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load_file
+
+from socialnav_mj.controllers.base import Observation, TwistController
+from socialnav_mj.features import FeatureSet, feature_set, running_state, view_of
+from socialnav_mj.geometry import Array
+from socialnav_mj.resources import assets_folder
+
+DEFAULT_POLICY = "plaza_continuous_seed0"
+
+
+class PolicyError(ValueError):
+    """A policy's files are missing, damaged or contradict each other."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedPolicy:
+    """Weights and card of a trained policy."""
+
+    card: dict[str, Any]
+    """Data, seed, configuration and metrics."""
+    features: FeatureSet
+    """What the networks see."""
+    actor: tuple[tuple[Array, Array], ...]
+    """(weight (out, in), bias (out,)) of each layer."""
+    reward: tuple[tuple[Array, Array], ...]
+    """The same of the reward network."""
+
+    def action(self, state: Array) -> Array:
+        """Deterministic action of the actor: tanh of the mean.
+
+        Args:
+            state: Shape (n, size + 2).
+
+        Returns:
+            (speed, turn) in [-1, 1], shape (n, 2).
+        """
+        return np.tanh(_forward(self.actor, state))
+
+    def reward_of(self, state: Array) -> Array:
+        """Learned reward.
+
+        Args:
+            state: Shape (n, size + 2).
+
+        Returns:
+            Shape (n,), in (-1, 1).
+        """
+        reward: Array = np.tanh(_forward(self.reward, state))[:, 0]
+        return reward
+
+
+def _forward(layers: tuple[tuple[Array, Array], ...], values: Array) -> Array:
+    for weight, bias in layers[:-1]:
+        values = np.maximum(values @ weight.T + bias, 0.0)
+    weight, bias = layers[-1]
+    return values @ weight.T + bias
+
+
+def policies_folder() -> Path:
+    """Where the shipped policies are.
+
+    Returns:
+        assets/policies.
+    """
+    return assets_folder() / "policies"
+
+
+def shipped_policies() -> tuple[str, ...]:
+    """Names of the policies that come with the package.
+
+    Returns:
+        In alphabetical order.
+    """
+    return tuple(sorted(path.stem for path in policies_folder().glob("*.safetensors")))
+
+
+@lru_cache(maxsize=32)
+def load_policy(name_or_path: str) -> TrainedPolicy:
+    """Read a policy: NAME.safetensors and NAME.json; never runs code from them.
+
+    Args:
+        name_or_path: Name of a shipped policy, or path of a .safetensors file with its card beside it.
+
+    Returns:
+        The policy.
+
+    Raises:
+        PolicyError: If there is none, or its files are damaged or contradict each other.
+    """
+    path = (
+        Path(name_or_path)
+        if name_or_path.endswith(".safetensors")
+        else policies_folder() / f"{name_or_path}.safetensors"
+    )
+    if not path.is_file():
+        raise PolicyError(
+            f"there is no policy {name_or_path!r}; available: {', '.join(shipped_policies())}, or the path of a "
+            ".safetensors file"
+        )
+    try:
+        card = json.loads(path.with_suffix(".json").read_text())
+        tensors = load_file(path)
+        features = feature_set(card["config"]["features"])
+        policy = TrainedPolicy(
+            card=card, features=features, actor=_layers(tensors, "actor"), reward=_layers(tensors, "reward")
+        )
+    except (OSError, ValueError, KeyError, TypeError, SafetensorError) as error:
+        raise PolicyError(f"{path} and its card {path.with_suffix('.json').name} are no policy: {error!r}") from error
+    size = features.size + 2
+    for network, layers, outputs in (("actor", policy.actor, 2), ("reward", policy.reward, 1)):
+        found = (layers[0][0].shape[1], layers[-1][0].shape[0])
+        if found != (size, outputs):
+            raise PolicyError(
+                f"{path}: the {network} maps {found[0]} to {found[1]} numbers; expected {size} to {outputs}"
+            )
+    return policy
+
+
+def _layers(tensors: dict[str, NDArray[Any]], network: str) -> tuple[tuple[Array, Array], ...]:
+    count = sum(name.startswith(f"{network}.") for name in tensors) // 2
+    if not count:
+        raise KeyError(f"{network}.0.weight")
+    return tuple(
+        (tensors[f"{network}.{i}.weight"].astype(float), tensors[f"{network}.{i}.bias"].astype(float))
+        for i in range(count)
+    )
+
+
+@dataclass(kw_only=True)
+class ReplayIRL(TwistController):
+    """Acts as the trained actor's mean: speed (a_0 + 1) / 2 of the limit, yaw rate a_1 of the limit."""
+
+    policy: str = DEFAULT_POLICY
+    """Name of a shipped policy, or path of a .safetensors file."""
+    name: str = "replay_irl"
+    _trained: TrainedPolicy = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._trained = load_policy(self.policy)
+
+    def twist(self, observation: Observation) -> Array:
+        """The actor's mean action.
+
+        Args:
+            observation: See `socialnav_mj.observation`.
+
+        Returns:
+            Shape (n_agents, 2) [m/s], [rad/s]; 0 for inactive slots.
+        """
+        rows = np.flatnonzero(observation["active"])
+        result = np.zeros((len(observation["active"]), 2))
+        if rows.size:
+            state = running_state(self._trained.features(view_of(observation, rows)))
+            action = self._trained.action(state)
+            result[rows, 0] = 0.5 * (action[:, 0] + 1.0) * self.limits.max_speed
+            result[rows, 1] = action[:, 1] * self.limits.max_yaw_rate
+        return result

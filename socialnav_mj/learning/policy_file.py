@@ -1,0 +1,35 @@
+"""Trained weights as safetensors with a JSON card."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from socialnav_mj.files import write_whole, written_whole
+from socialnav_mj.learning.replay_irl import ReplayIRL
+
+
+def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
+    """Write what `socialnav_mj.controllers.replay_irl` reads.
+
+    Args:
+        model: The learner.
+        path: Of the .safetensors file; the card is written beside it.
+        card: JSON values.
+    """
+    tensors = _linear_layers("actor", [*model.actor.latent_pi, model.actor.mu])
+    tensors |= _linear_layers("reward", list(model.reward_net.layers))
+    with written_whole(path) as part:
+        save_file(tensors, part)
+    write_whole(path.with_suffix(".json"), (json.dumps(card, indent=1, sort_keys=True) + "\n").encode())
+
+
+def _linear_layers(network: str, modules: list[nn.Module]) -> dict[str, Tensor]:
+    linear = [module for module in modules if isinstance(module, nn.Linear)]
+    return {
+        f"{network}.{i}.{name}": parameter.detach().clone()
+        for i, layer in enumerate(linear)
+        for name, parameter in layer.named_parameters()
+    }

@@ -1,0 +1,227 @@
+"""ReplayIRL: SAC and guided cost learning on one replay buffer (paper section III-A; Baghi and Dudek 2021).
+
+SAC is stable-baselines3's. It learns from the reward that the reward network gives at the moment of sampling; between
+its updates a reward step compares expert states with states of the same buffer, so the reward costs no environment
+step.
+"""
+
+import math
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import SAC
+from stable_baselines3.common.buffers import ReplayBuffer
+from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
+
+from socialnav_mj.features import FeatureSet
+from socialnav_mj.learning.config import TrainingConfig
+from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
+from socialnav_mj.learning.experts import Demonstrations
+from socialnav_mj.learning.reward import (
+    RewardNet,
+    gradient_penalty,
+    irl_loss,
+    log_partition_fused,
+    log_partition_importance,
+)
+from socialnav_mj.learning.shared_buffer import SharedReplayBuffer, mirrored
+
+_UNIFORM_LOG_PROB = -2.0 * math.log(2.0)
+"""Log density of a uniformly random action in [-1, 1]^2."""
+
+
+class ReplayIRL(SAC):
+    """SAC whose replay buffer is the one the reward is learned from."""
+
+    replay_buffer: SharedReplayBuffer
+
+    def __init__(self, env: CrowdVecEnv, experts: Demonstrations, features: FeatureSet, config: TrainingConfig) -> None:
+        """Make the networks and the buffer.
+
+        Args:
+            env: The crowd.
+            experts: Demonstrations.
+            features: Of environment and experts.
+            config: Of the training.
+        """
+        self.config, self.features = config, features
+        super().__init__(
+            "MlpPolicy",
+            env,
+            learning_rate=lambda left: config.learning_rate * (0.1 + 0.9 * left),
+            buffer_size=config.buffer_size,
+            learning_starts=config.random_scene_steps * env.num_envs,
+            batch_size=config.batch_size,
+            tau=config.tau,
+            gamma=config.gamma,
+            train_freq=(1, "step"),
+            gradient_steps=config.updates_per_scene_step,
+            replay_buffer_class=SharedReplayBuffer,
+            replay_buffer_kwargs={"features": features, "gamma": config.gamma, "seed": config.seed},
+            policy_kwargs={"net_arch": list(config.hidden)},
+            seed=config.seed,
+            device="cpu",
+        )
+        size = int(np.prod(env.observation_space.shape or ()))
+        self.reward_net = RewardNet(size, config.hidden)
+        self.reward_optimizer = torch.optim.AdamW(
+            self.reward_net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+        )
+        self.replay_buffer.reward_net = self.reward_net
+        self.random = np.random.default_rng(config.seed + 1)
+        self.running = experts.running.astype(np.float32)
+        self.absorbed = experts.absorbed.astype(np.float32)
+        self.seconds = {"sac": 0.0, "reward": 0.0}
+        """CPU-bound time spent so far, by kind [s]."""
+        self.updates = 0
+        """SAC updates so far."""
+
+    def _store_transition(
+        self,
+        replay_buffer: ReplayBuffer,
+        buffer_action: NDArray[Any],
+        new_obs: NDArray[Any] | dict[str, NDArray[Any]],
+        reward: NDArray[Any],
+        dones: NDArray[Any],
+        infos: list[dict[str, Any]],
+    ) -> None:
+        """Store the transitions of active slots with the log densities of their actions.
+
+        Args:
+            replay_buffer: The shared buffer.
+            buffer_action: In [-1, 1], shape (n_slots, 2).
+            new_obs: Shape (n_slots, size).
+            reward: Not used.
+            dones: Shape (n_slots,).
+            infos: Of the crowd.
+        """
+        assert isinstance(replay_buffer, SharedReplayBuffer) and isinstance(new_obs, np.ndarray)
+        next_obs = new_obs.copy()
+        for slot in np.flatnonzero(dones):
+            next_obs[slot] = infos[slot]["terminal_observation"]
+        before = self._last_obs
+        assert isinstance(before, np.ndarray)
+        log_prob = self._log_prob(before, buffer_action)
+        replay_buffer.store(before, next_obs, buffer_action, dones, infos, log_prob)
+        self._last_obs = self._last_original_obs = new_obs
+
+    def _log_prob(self, observation: NDArray[Any], action: NDArray[Any]) -> NDArray[Any]:
+        if self.num_timesteps <= self.learning_starts:
+            return np.full(len(action), _UNIFORM_LOG_PROB, dtype=np.float32)
+        with torch.no_grad():
+            mean, log_std, _ = self.actor.get_action_dist_params(torch.as_tensor(observation))
+            distribution = SquashedDiagGaussianDistribution(action.shape[1]).proba_distribution(mean, log_std)
+            result: NDArray[Any] = distribution.log_prob(torch.as_tensor(action)).numpy()
+        return result
+
+    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+        """SAC updates with reward steps between them.
+
+        Args:
+            gradient_steps: SAC updates.
+            batch_size: Of SAC.
+        """
+        for _ in range(gradient_steps):
+            begin = perf_counter()
+            super().train(1, batch_size)
+            self.updates += 1
+            self.seconds["sac"] += perf_counter() - begin
+            if self.updates % self.config.updates_per_reward_step == 0:
+                begin = perf_counter()
+                self.reward_step()
+                self.seconds["reward"] += perf_counter() - begin
+
+    def reward_step(self) -> None:
+        """One step of the reward network on the shared buffer."""
+        config = self.config
+        for group in self.reward_optimizer.param_groups:
+            group["lr"] = self.lr_schedule(self._current_progress_remaining)
+        expert = torch.as_tensor(self._expert_states(config.batch_size))
+        expert_reward = self.reward_net(expert)
+        if config.partition == "segment":
+            states, log_prob = self.replay_buffer.sample_segments(config.batch_size, config.segment_length)
+            policy = torch.as_tensor(states)
+            policy_reward = self.reward_net(policy)
+            log_partition, effective = log_partition_importance(
+                policy_reward.sum(dim=1), torch.as_tensor(log_prob).sum(dim=1)
+            )
+            loss = irl_loss(expert_reward, log_partition / config.segment_length)
+            policy, policy_reward = policy[:, 0], policy_reward[:, 0]
+        else:
+            states, log_prob = self.replay_buffer.sample_states(config.batch_size, config.absorbing_share)
+            policy = torch.as_tensor(states)
+            policy_reward = self.reward_net(policy)
+            if config.partition == "importance":
+                log_partition, effective = log_partition_importance(policy_reward, torch.as_tensor(log_prob))
+            else:
+                log_partition, effective = log_partition_fused(policy_reward, expert_reward)
+            loss = irl_loss(expert_reward, log_partition)
+        mix = torch.as_tensor(self.random.random((config.batch_size, 1)), dtype=torch.float32)
+        penalty = gradient_penalty(self.reward_net, expert, policy, mix)
+        size = 0.5 * (expert_reward**2).mean() + 0.5 * (policy_reward**2).mean()
+        total = loss + config.gradient_penalty * penalty + config.output_penalty * size
+        self.reward_optimizer.zero_grad()
+        total.backward()
+        self.reward_optimizer.step()
+        self.logger.record("reward/loss", float(loss.detach()))
+        self.logger.record("reward/expert", float(expert_reward.detach().mean()))
+        self.logger.record("reward/policy", float(policy_reward.detach().mean()))
+        self.logger.record("reward/effective_sample_size", float(effective.detach()))
+        self.logger.record("reward/gradient_penalty", float(penalty.detach()))
+
+    def _expert_states(self, count: int) -> NDArray[np.float32]:
+        absorbed = round(count * self.config.absorbing_share)
+        states = np.concatenate(
+            [
+                self.absorbed[self.random.integers(len(self.absorbed), size=absorbed)],
+                self.running[self.random.integers(len(self.running), size=count - absorbed)],
+            ]
+        )
+        return mirrored(self.features, states, self.random.random(count) < 0.5)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Everything that goes on after a resume, apart from the scene, which begins anew, and the buffer.
+
+        Returns:
+            Tensors and plain values, readable with torch.load(weights_only=True).
+        """
+        assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
+        return {
+            "policy": self.policy.state_dict(),
+            "actor_optimizer": self.actor.optimizer.state_dict(),
+            "critic_optimizer": self.critic.optimizer.state_dict(),
+            "log_ent_coef": self.log_ent_coef.detach(),
+            "ent_coef_optimizer": self.ent_coef_optimizer.state_dict(),
+            "reward_net": self.reward_net.state_dict(),
+            "reward_optimizer": self.reward_optimizer.state_dict(),
+            "num_timesteps": self.num_timesteps,
+            "updates": self.updates,
+            "n_updates": self._n_updates,
+            "seconds": dict(self.seconds),
+            "torch_random": torch.get_rng_state(),
+        }
+
+    def restore(self, state: dict[str, Any], buffer: dict[str, NDArray[Any]]) -> None:
+        """Go on from a checkpoint.
+
+        Args:
+            state: Of `checkpoint`.
+            buffer: Of `SharedReplayBuffer.state`.
+        """
+        assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
+        self.policy.load_state_dict(state["policy"])
+        self.actor.optimizer.load_state_dict(state["actor_optimizer"])
+        self.critic.optimizer.load_state_dict(state["critic_optimizer"])
+        with torch.no_grad():
+            self.log_ent_coef.copy_(state["log_ent_coef"])
+        self.ent_coef_optimizer.load_state_dict(state["ent_coef_optimizer"])
+        self.reward_net.load_state_dict(state["reward_net"])
+        self.reward_optimizer.load_state_dict(state["reward_optimizer"])
+        self.num_timesteps, self.updates = int(state["num_timesteps"]), int(state["updates"])
+        self._n_updates = int(state["n_updates"])
+        self.seconds = dict(state["seconds"])
+        torch.set_rng_state(state["torch_random"])
+        self.replay_buffer.restore(buffer)

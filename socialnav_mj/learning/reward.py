@@ -1,0 +1,111 @@
+"""The reward network and the maximum-entropy loss with its estimates of the partition function.
+
+The loss is the negative log-likelihood of paper eq 1 per state, -E_expert[r] + log Z (Ziebart et al. 2008; Finn et al.
+2016, "Guided Cost Learning", PMLR 48, doi 10.48550/arXiv.1603.00448). log Z is estimated from the samples of the shared
+replay buffer in one of three ways:
+
+- "fused": log mean exp(r) over buffer samples and expert samples together, which keeps an expert state that the buffer
+  does not know from getting an unbounded reward (Finn et al. 2016, section 4.3, fuse both sets likewise).
+- "importance": every buffer state weighed by 1/q, q the density with which the behaviour policy chose the action that
+  led to it (paper eq 2, a state at a time).
+- "segment": paper eq 2 as printed, over segments of trajectories: sums of r and products of q along each segment.
+
+The effective sample size, (sum w)^2 / sum w^2 with w the weights of the estimate, says how many samples it rests on.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+
+class RewardNet(nn.Module):
+    """State-only reward r(s) in (-1, 1): ReLU layers and a tanh."""
+
+    def __init__(self, state_size: int, hidden: Sequence[int]) -> None:
+        """Make the network.
+
+        Args:
+            state_size: Length of a state, with flags.
+            hidden: Widths of the hidden layers.
+        """
+        super().__init__()
+        layers: list[nn.Module] = []
+        for width in hidden:
+            layers += [nn.Linear(state_size, width), nn.ReLU()]
+            state_size = width
+        self.layers = nn.Sequential(*layers, nn.Linear(state_size, 1), nn.Tanh())
+
+    def forward(self, state: Tensor) -> Tensor:
+        """Reward of states.
+
+        Args:
+            state: Shape (..., state_size).
+
+        Returns:
+            Shape (...).
+        """
+        reward: Tensor = self.layers(state).squeeze(-1)
+        return reward
+
+
+def log_partition_fused(policy_reward: Tensor, expert_reward: Tensor) -> tuple[Tensor, Tensor]:
+    """Estimate "fused".
+
+    Args:
+        policy_reward: Of buffer samples, shape (n,).
+        expert_reward: Of expert samples, shape (m,).
+
+    Returns:
+        log Z and the effective sample size, scalars.
+    """
+    return _log_mean_exp(torch.cat([policy_reward, expert_reward]))
+
+
+def log_partition_importance(policy_reward: Tensor, log_prob: Tensor) -> tuple[Tensor, Tensor]:
+    """Estimate "importance"; also "segment", with sums along segments in place of single values.
+
+    Args:
+        policy_reward: Of buffer samples, shape (n,).
+        log_prob: Log density of the behaviour policy for each, shape (n,).
+
+    Returns:
+        log Z up to a constant, and the effective sample size, scalars.
+    """
+    return _log_mean_exp(policy_reward - log_prob)
+
+
+def _log_mean_exp(logit: Tensor) -> tuple[Tensor, Tensor]:
+    total = torch.logsumexp(logit, dim=0)
+    weight = torch.softmax(logit.detach(), dim=0)
+    return total - torch.log(torch.tensor(float(len(logit)))), 1.0 / (weight**2).sum()
+
+
+def irl_loss(expert_reward: Tensor, log_partition: Tensor) -> Tensor:
+    """Negative log-likelihood of the expert per state (paper eq 1).
+
+    Args:
+        expert_reward: Shape (m,), or (m,) sums along segments.
+        log_partition: Scalar estimate of log Z.
+
+    Returns:
+        Scalar.
+    """
+    return log_partition - expert_reward.mean()
+
+
+def gradient_penalty(reward_net: nn.Module, expert: Tensor, policy: Tensor, mix: Tensor) -> Tensor:
+    """Mean squared norm of the reward's gradient between expert and policy states.
+
+    Args:
+        reward_net: The network.
+        expert: Shape (n, state_size).
+        policy: Shape (n, state_size).
+        mix: Shares of the expert in the mixture, shape (n, 1).
+
+    Returns:
+        Scalar.
+    """
+    between = (mix * expert + (1.0 - mix) * policy).requires_grad_(True)
+    (gradient,) = torch.autograd.grad(reward_net(between).sum(), between, create_graph=True)
+    return (gradient**2).sum(dim=-1).mean()

@@ -1,0 +1,255 @@
+"""A training from its configuration to its best policy: checkpoints, validation, resume."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+
+import tasks
+from socialnav_mj import metrics
+from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
+from socialnav_mj.controllers.replay_irl import load_policy
+from socialnav_mj.environment import make_scenario
+from socialnav_mj.features import feature_set
+from socialnav_mj.files import write_whole, written_whole
+from socialnav_mj.learning.config import TrainingConfig
+from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
+from socialnav_mj.learning.experts import Demonstrations, demonstrate
+from socialnav_mj.learning.policy_file import save_policy
+from socialnav_mj.learning.replay_irl import ReplayIRL
+from socialnav_mj.recordings import Recording, load_recording
+from socialnav_mj.recordings.window import window
+from socialnav_mj.rollout import package_versions, rollout
+
+PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
+CHECKPOINT, BUFFER, HISTORY, CONFIG, BEST = (
+    "checkpoint.pt",
+    "buffer.npz",
+    "history.json",
+    "config.json",
+    "best.safetensors",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """What is told of a training under way."""
+
+    scene_steps: int
+    """Done so far."""
+    transitions: int
+    """In the shared buffer."""
+    validation: dict[str, float] | None
+    """Of the checkpoint just written, if there was one."""
+
+
+def train(
+    config: TrainingConfig,
+    folder: str | Path,
+    *,
+    data_dir: str | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Path:
+    """Train ReplayIRL, or go on with a training that was stopped.
+
+    Args:
+        config: Must equal the folder's, if it holds a training.
+        folder: Gets config.json, checkpoint.pt, buffer.npz, history.json, best.safetensors, best.json and tensorboard/.
+        data_dir: Where recordings are looked for first.
+        progress: Called after every scene step.
+
+    Returns:
+        Path of the best policy's weights.
+
+    Raises:
+        ValueError: If the folder holds a training with another configuration.
+        FileNotFoundError: If a recording is not there.
+    """
+    folder = Path(folder)
+    _claim(folder, config)
+    torch.set_num_threads(1)
+    recordings = [load_recording(name, data_dir=data_dir) for name in config.datasets]
+    features = feature_set(config.features)
+    training = [window(recording, *config.train_window) for recording in recordings]
+    experts = Demonstrations.joined(
+        [
+            demonstrate(
+                recording,
+                features,
+                make_scenario(share=1.0),
+                minimum_displacement=config.expert_displacement,
+                contact_distance=config.expert_contact_distance,
+            )
+            for recording in training
+        ]
+    )
+    done = _read_history(folder)
+    env = CrowdVecEnv(
+        training,
+        features,
+        shares=config.shares,
+        n_slots=config.n_slots,
+        robot_radius=config.robot_radius,
+        pedestrian_radius=config.pedestrian_radius,
+        # A resumed training goes on with scenes it has not seen.
+        seed=config.seed + 1_000_003 * len(done),
+    )
+    model = ReplayIRL(env, experts, features, config)
+    model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
+    if (folder / CHECKPOINT).exists():
+        with np.load(folder / BUFFER, allow_pickle=False) as buffer:
+            model.restore(torch.load(folder / CHECKPOINT, weights_only=True), dict(buffer))
+    left = config.scene_steps * env.num_envs - model.num_timesteps
+    if left > 0:
+        callback = _Checkpoints(config, folder, recordings, done, progress)
+        model.learn(left, callback=callback, reset_num_timesteps=False, log_interval=1)
+    return folder / BEST
+
+
+def validate(
+    policy_path: Path, recordings: list[Recording], *, part: tuple[float, float], shares: tuple[float, ...]
+) -> dict[str, float]:
+    """Success and intrusions of a policy in a part of recordings.
+
+    Args:
+        policy_path: Of the weights.
+        recordings: Whole recordings.
+        part: Window, as shares of their duration.
+        shares: Of replaced people; the scenes have draws 0, 1, 2, ...
+
+    Returns:
+        success, intrusion_share, time_under_way [s], n_agents.
+    """
+    load_policy.cache_clear()
+    success: list[float] = []
+    time: list[float] = []
+    intrusions = steps = 0.0
+    for recording in recordings:
+        for draw, share in enumerate(shares):
+            environment = tasks.load("scenario_1", {"dataset": window(recording, *part), "share": share, "seed": draw})
+            values = metrics.per_agent(rollout(environment, Policy(policy=str(policy_path))))
+            success += values["success"].astype(float).tolist()
+            time += values["time_under_way"].tolist()
+            intrusions += float(np.nansum(values["intimate_intrusions"]))
+            steps += float(np.nansum(values["active_steps"]))
+    return {
+        "success": float(np.mean(success)),
+        "intrusion_share": intrusions / max(steps, 1.0),
+        "time_under_way": float(np.nanmean(time)),
+        "n_agents": float(len(success)),
+    }
+
+
+def _claim(folder: Path, config: TrainingConfig) -> None:
+    """Write the configuration, or compare it with what is there."""
+    wanted = json.loads(json.dumps(config.as_dict()))
+    path = folder / CONFIG
+    if not path.exists():
+        write_whole(path, (json.dumps(wanted, indent=1) + "\n").encode())
+        return
+    found = json.loads(path.read_text())
+    for key in sorted({*wanted, *found}):
+        if wanted.get(key) != found.get(key):
+            raise ValueError(
+                f"{path}: the training there has {key} = {found.get(key)!r}, but {wanted.get(key)!r} is asked for; "
+                "choose another output folder"
+            )
+
+
+def _read_history(folder: Path) -> list[dict[str, Any]]:
+    path = folder / HISTORY
+    history: list[dict[str, Any]] = json.loads(path.read_text()) if path.exists() else []
+    return history
+
+
+class _Checkpoints(BaseCallback):
+    """Every so many scene steps: write a checkpoint, validate it, keep the best policy."""
+
+    def __init__(
+        self,
+        config: TrainingConfig,
+        folder: Path,
+        recordings: list[Recording],
+        history: list[dict[str, Any]],
+        progress: Callable[[Progress], None] | None,
+    ) -> None:
+        super().__init__()
+        self._config, self._folder, self._recordings = config, folder, recordings
+        self._history, self._report = history, progress
+        self._begin = perf_counter()
+        self._outcomes: list[int] = []
+
+    def _on_step(self) -> bool:
+        """After every step of the scene, before its updates.
+
+        Returns:
+            True: go on.
+        """
+        model = self.model
+        assert isinstance(model, ReplayIRL)
+        scene_steps = model.num_timesteps // model.n_envs
+        self._outcomes += [info["outcome"] for info in self.locals["infos"] if "outcome" in info]
+        validation = None
+        if scene_steps % self._config.checkpoint_every == 0 or scene_steps == self._config.scene_steps:
+            validation = self._checkpoint(model, scene_steps)
+        if self._report is not None:
+            self._report(
+                Progress(scene_steps=scene_steps, transitions=model.replay_buffer.size(), validation=validation)
+            )
+        return True
+
+    def _checkpoint(self, model: ReplayIRL, scene_steps: int) -> dict[str, float]:
+        config, folder = self._config, self._folder
+        elapsed = perf_counter() - self._begin
+        latest = folder / "latest.safetensors"
+        card = {
+            "config": config.as_dict(),
+            "scene_steps": scene_steps,
+            "transitions": model.replay_buffer.size(),
+            "updates": model.updates,
+            "recordings": [
+                {"name": r.name, "variant": r.variant, "checksum": r.checksum, "frame_rate": r.frame_rate}
+                for r in self._recordings
+            ],
+            "versions": package_versions(PACKAGES),
+        }
+        save_policy(model, latest, card)
+        begin = perf_counter()
+        validation = validate(latest, self._recordings, part=config.validation_window, shares=config.validation_shares)
+        validation_seconds = perf_counter() - begin
+        score = validation["success"] - config.intrusion_weight * validation["intrusion_share"]
+        best = max((entry["score"] for entry in self._history), default=-math.inf)
+        counts = np.bincount(self._outcomes, minlength=3) / max(len(self._outcomes), 1)
+        entry = {
+            "scene_steps": scene_steps,
+            "score": score,
+            **validation,
+            "training_arrived": float(counts[0]),
+            "training_timed_out": float(counts[1]),
+            "training_collided": float(counts[2]),
+            "seconds": {**model.seconds, "all": elapsed, "validation": validation_seconds},
+        }
+        self._outcomes = []
+        if score > best:
+            save_policy(model, folder / BEST, {**card, "validation": validation, "score": score})
+        for name in ("success", "intrusion_share", "time_under_way"):
+            model.logger.record(f"validation/{name}", validation[name])
+        for name in ("training_arrived", "training_timed_out", "training_collided"):
+            model.logger.record(f"training/{name}", entry[name])
+        model.logger.dump(model.num_timesteps)
+        with written_whole(folder / BUFFER) as part:
+            np.savez(part, **model.replay_buffer.state())  # type: ignore[arg-type]
+        with written_whole(folder / CHECKPOINT) as part:
+            torch.save(model.checkpoint(), part)
+        self._history.append(entry)
+        write_whole(folder / HISTORY, (json.dumps(self._history, indent=1) + "\n").encode())
+        self._begin += perf_counter() - begin
+        return validation
