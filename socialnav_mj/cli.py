@@ -127,7 +127,7 @@ class Evaluate:
 class Report:
     """Make the tables, the report and the traces of a run again from its episodes."""
 
-    folder: tyro.conf.Positional[Path]
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
     """Of `evaluate`."""
     jobs: int = -1
     """Processes; -1 for one a core."""
@@ -198,7 +198,7 @@ class DataList:
 class DataInfo:
     """Facts of a recording: people, concurrency, speeds, distances, and who comes how near."""
 
-    name: tyro.conf.Positional[str]
+    name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
     """Name in the catalogue, or path of a recording."""
     variant: Name = None
     """Which annotation; the first by default."""
@@ -221,16 +221,18 @@ class DataInfo:
 class DataFetch:
     """Download a recording from its public source and verify its checksum."""
 
-    name: tyro.conf.Positional[str]
+    name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
     """Name in the catalogue."""
     data_dir: Folder = None
-    """Where to put it; $SOCIALNAV_MJ_DATA, or the user cache, by default."""
+    """Where to put it; the user cache by default."""
 
     def run(self) -> None:
         """Download."""
         from socialnav_mj.recordings.fetch import fetch
 
-        for path in fetch(self.name, data_dir=self.data_dir):
+        with _errors.status(f"downloading {self.name}"):
+            paths = fetch(self.name, data_dir=self.data_dir)
+        for path in paths:
             _print(str(path))
 
 

@@ -72,7 +72,7 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     """
     kind = type(controller)
     result: dict[str, Any] = {"class": f"{kind.__module__}:{kind.__qualname__}"}
-    names = [field.name for field in fields(controller) if field.init] if is_dataclass(controller) else []
+    names: list[str] = [field.name for field in fields(controller) if field.init] if is_dataclass(controller) else []
     for name in names:
         value = getattr(controller, name)
         try:

@@ -1,0 +1,297 @@
+"""The command as a user types it: what goes to which stream, exit codes, and what an interruption leaves."""
+
+import functools
+import hashlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from socialnav_mj.cli import main
+from socialnav_mj.episode import read_header
+from socialnav_mj.recordings import catalogue as catalogue_module
+
+TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
+QUICK = ("evaluate", "--dataset", TINY, "--scenarios", "1", "--draws", "1", "--jobs", "1")
+COMMAND = (sys.executable, "-c", "from socialnav_mj.cli import main; main()")
+SLOW = """
+import time
+from socialnav_mj.controllers import GoStraight
+
+class Slow(GoStraight):
+    def __init__(self):
+        super().__init__(name="slow")
+
+    def act(self, observation):
+        time.sleep(0.5)
+        return super().act(observation)
+"""
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(sys, "argv", ["socialnav-mj", "as it was typed"])
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def fails(capsys, *args):
+    """Runs a command that has to fail; its errors, on one line."""
+    with pytest.raises(SystemExit) as caught:
+        main([*args])
+    output, errors = capsys.readouterr()
+    assert caught.value.code == 2 and output == "" and "Traceback" not in errors
+    return re.sub(r"[\s│]+", " ", errors)
+
+
+# evaluate and report
+
+
+def test_command_of_the_issue_is_accepted(capsys, monkeypatch):
+    import socialnav_mj.evaluation as module
+
+    asked = []
+
+    def note(evaluation, out, *, command, n_jobs):
+        asked.append((evaluation, str(out), n_jobs))
+        raise ValueError("that will do")
+
+    monkeypatch.setattr(module, "evaluate", note)
+    typed = "evaluate --dataset plaza --scenarios 1 2 3 4 --controllers potential_field go_straight --draws 3 --seed 0"
+    assert "that will do" in fails(capsys, *typed.split(), "--jobs", "2", "--out", "runs/first")
+    assert "that will do" in fails(capsys, "evaluate")
+    (evaluation, out, jobs), (default, default_out, default_jobs) = asked
+    assert (out, jobs, default_out, default_jobs) == ("runs/first", 2, "runs/plaza", -1)
+    assert evaluation == default
+    assert evaluation.scenarios == ("scenario_1", "scenario_2", "scenario_3", "scenario_4")
+    assert evaluation.controllers == ("potential_field", "go_straight") and (evaluation.draws, evaluation.seed) == (
+        3,
+        0,
+    )
+
+
+def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(capsys):
+    main([*QUICK])
+    output, errors = capsys.readouterr()
+    assert "episodes" in errors and "3/3" in errors and "real time" in errors and "left" in errors
+    assert "episodes" not in output
+    assert max(map(len, output.splitlines())) <= 80
+    for name in ("tiny (text), scenario_1", "potential_field", "go_straight", "human", "success", "path"):
+        assert name in output
+    assert "report: runs/tiny/report.md\ntraces: runs/tiny/traces (open with: rerun FILE.rrd)" in output
+    folder = Path("runs/tiny")
+    assert {path.name for path in folder.iterdir()} >= {
+        *("agents.parquet", "summary.csv", "summary.json", "report.md", "run.json", "episodes", "traces")
+    }
+    assert json.loads((folder / "run.json").read_text()) == {
+        "command": "socialnav-mj 'as it was typed'",
+        "controllers": ["potential_field", "go_straight", "human"],
+    }
+    written = (folder / "report.md").read_bytes()
+    main(["report", "runs/tiny", "--jobs", "1"])
+    assert capsys.readouterr().out == output and (folder / "report.md").read_bytes() == written
+
+
+def test_settings_of_the_command_reach_the_episodes():
+    options = ["--robot-radius", "0.18", "--pedestrian-radius", "0.2", "--turn-limit", "per_second"]
+    options += ["--on-collision", "retire", "--control-timestep", "0.1", "--seed", "4", "--out", "o"]
+    main([*QUICK, *options, "--controllers", "potential_field(attraction_limit=None)"])
+    name = "scenario_1.potential_field-attraction_limit=None-.draw_004.npz"
+    metadata = read_header(Path("o/episodes") / name)["metadata"]
+    scenario = metadata["scenario"]
+    assert (scenario["robot"]["radius"], scenario["pedestrian_radius"], scenario["turn_limit"]) == (
+        0.18,
+        0.2,
+        "per_second",
+    )
+    assert (scenario["on_collision"], scenario["control_timestep"], scenario["seed"]) == ("retire", 0.1, 4)
+    assert metadata["controller_config"]["attraction_limit"] is None
+
+
+def test_failing_controller_is_told_once_and_the_others_are_kept(capsys):
+    Path("mine.py").write_text(
+        "class Failing:\n    name = 'failing'\n    def reset(self, limits, *, seed=0): pass\n"
+        "    def act(self, observation): return observation['nothing']\n"
+    )
+    errors = fails(capsys, *QUICK, "--out", "o", "--controllers", "go_straight", "mine:Failing")
+    assert errors.count("KeyError: 'nothing'") == 1 and "mine.py:4" in errors
+    assert "1 of 3 episodes failed, the others are kept; the same command runs the failed ones again" in errors
+    assert len(list(Path("o/episodes").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("args", "named"),
+    [
+        (["evaluate", "--dataset", "nowhere"], "error: no recording 'nowhere': it is neither in the catalogue"),
+        ([*QUICK, "--controllers", "nobody"], "unknown controller 'nobody'; available: potential_field"),
+        ([*QUICK, "--controllers", "no.such:Thing"], "cannot be imported from 'no.such:Thing': No module named 'no'"),
+        ([*QUICK, "--controllers"], "controllers = () is not allowed"),
+        ([*QUICK, "--scenarios", "5"], "invalid choice '5' for argument '--scenarios'"),
+        ([*QUICK, "--draws", "0"], "draws = 0 is not allowed; allowed: integers >= 1"),
+        ([*QUICK, "--draws", "many"], "invalid"),
+        ([*QUICK, "--jobs", "0"], "n_jobs = 0 is not allowed"),
+        ([*QUICK, "--variant", "vsp"], "tiny.txt needs its homography (pixels to metres), a file H.txt beside it"),
+        ([*QUICK, "--robot-radius", "-1"], "Robot.radius = -1.0 is not allowed; allowed: numbers > 0"),
+        ([*QUICK, "--control-timestep", "0.013"], "control_timestep = 0.013 is not allowed"),
+        ([*QUICK, "--turn-limit", "none"], "invalid choice 'none' for argument '--turn-limit'"),
+        (["report", "nowhere"], "error: no episodes in nowhere/episodes; expected *.npz files"),
+        (["data", "info", "nowhere"], "no recording 'nowhere'"),
+        (["data", "fetch", "nowhere"], "unknown recording 'nowhere'; available: "),
+        (["bench", "--dataset", "nowhere"], "no recording 'nowhere'"),
+        (["bench", "--dataset", TINY, "--controller", "nobody"], "unknown controller 'nobody'"),
+        (["dance"], "Unrecognized options: dance"),
+        ([], "Expected one of {evaluate, report, list, data, bench}"),
+    ],
+)
+def test_bad_input_is_one_clear_message(capsys, args, named):
+    assert named in fails(capsys, *args)
+    assert not Path("runs").exists()
+
+
+def test_path_in_a_message_is_not_broken_by_the_terminals_width(tmp_path, capsys):
+    folder = tmp_path / ("long_" * 30)
+    with pytest.raises(SystemExit):
+        main(["report", str(folder)])
+    assert f"{folder}/episodes" in capsys.readouterr().err
+
+
+def interrupted(folder, jobs):
+    """Start a run whose second controller is slow, press Ctrl-C when the first is done; exit code and errors."""
+    Path("slow.py").write_text(SLOW)
+    args = ("evaluate", "--dataset", TINY, "--scenarios", "1", "--draws", "2", "--out", folder, "--jobs", jobs)
+    process = subprocess.Popen(
+        [*COMMAND, *args, "--controllers", "go_straight", "slow:Slow"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    episodes = Path(folder) / "episodes"
+    deadline = time.monotonic() + 60.0
+    while len(list(episodes.glob("[!.]*.npz"))) < 2 and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the command and to its processes
+    output, errors = process.communicate(timeout=60)
+    assert output == ""
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_ctrl_c_leaves_finished_episodes_and_the_next_run_goes_on(jobs, capsys):
+    code, errors = interrupted("o", jobs)
+    assert code == 130, errors
+    assert "interrupted; the same command goes on where it was" in errors and "Traceback" not in errors
+    kept = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").glob("[!.]*.npz")}
+    assert set(kept) == {"scenario_1.go_straight.draw_000.npz", "scenario_1.go_straight.draw_001.npz"}
+    main([*QUICK, "--draws", "2", "--out", "o", "--controllers", "go_straight"])
+    after = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").glob("[!.]*.npz")}
+    assert len(after) == 4 and {name: after[name] for name in kept} == kept
+    assert "4/4" in capsys.readouterr().err
+
+
+# list, data, bench
+
+
+def test_list_shows_tasks_controllers_and_recordings(capsys):
+    main(["list"])
+    output = capsys.readouterr().out
+    for name in ("scenario_1", "10%", "scenario_4", "90%", "potential_field", "go_straight", "package.module:Class"):
+        assert name in output
+    assert "plaza" in output and "students003" in output and max(map(len, output.splitlines())) <= 80
+
+
+def test_data_list_shows_where_recordings_come_from_and_whole_checksums(capsys, tmp_path):
+    main(["data", "list", "--data-dir", str(tmp_path)])
+    output = capsys.readouterr().out
+    joined = re.sub(r"[\s│]+", "", output)
+    for row in catalogue_module.catalogue().values():
+        assert row.name in output and f"{row.frame_rate:g} Hz" in output
+        for files in row.variants.values():
+            assert all(checksum in joined for checksum in files.values())
+    assert "CC0-1.0" in output and "OpenTraj" in output
+
+
+def test_data_info_shows_the_facts_of_any_recording(capsys):
+    main(["data", "info", TINY])
+    output = capsys.readouterr().out
+    assert re.search(r"people\s+3\b", output)
+    assert "0.25/0.32/0.4 m" in output
+    assert f"variant text, checksum {hashlib.sha256(Path(TINY).read_bytes()).hexdigest()}" in output
+
+
+def test_data_fetch_downloads_into_the_folder_that_is_given(capsys, tmp_path, monkeypatch):
+    (tmp_path / "served" / "there").mkdir(parents=True)
+    content = Path(TINY).read_bytes()
+    (tmp_path / "served" / "there" / "tiny.txt").write_bytes(content)
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *args):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=tmp_path / "served"))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    row = catalogue_module.CatalogueRow(
+        name="little",
+        title="t",
+        source="s",
+        licence="l",
+        scale="m",
+        axis_order="xy",
+        frame_rate=25.0,
+        folder="there",
+        url=f"http://127.0.0.1:{server.server_port}/there/",
+        variants={"text": {"tiny.txt": hashlib.sha256(content).hexdigest()}},
+    )
+    monkeypatch.setattr(catalogue_module, "catalogue", lambda: {"little": row})
+    try:
+        main(["data", "fetch", "little", "--data-dir", str(tmp_path / "data")])
+    finally:
+        server.shutdown()
+        server.server_close()
+    assert capsys.readouterr().out.split() == [str(tmp_path / "data" / "there" / "tiny.txt")]
+    assert (tmp_path / "data" / "there" / "tiny.txt").read_bytes() == content
+
+
+def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
+    main(["bench", "--dataset", TINY, "--scenarios", "4", "--repetitions", "2", "--out", "bench.json"])
+    output = capsys.readouterr().out
+    assert "episode / mj_step" in output and "real-time factor" in output and "trace [MB]" in output
+    content = json.loads(Path("bench.json").read_text())
+    (cost,) = content["costs"]
+    assert cost["scenario"] == "scenario_4" and cost["n_agents"] == 3
+    assert cost["ratio_low"] <= cost["ratio"] <= cost["ratio_high"]
+    assert cost["real_time_factor"] == pytest.approx(cost["simulated_time"] / cost["episode_cpu"])
+    assert content["recording"]["name"] == "tiny" and "mujoco" in content["versions"]
+
+
+@pytest.mark.parametrize(
+    ("args", "named"),
+    [
+        ([], ["evaluate", "report", "list", "data", "bench"]),
+        (
+            ["evaluate"],
+            ["--dataset", "--scenarios {1,2,3,4} ...", "--controllers", "--draws", "--seed", "--jobs", "--out"],
+        ),
+        (["evaluate"], ["where it was", "rad/s", "(default: plaza)", "(default: 1 2 3 4)"]),
+        (["report"], ["FOLDER", "--jobs"]),
+        (["data"], ["list", "info", "fetch"]),
+        (["data", "fetch"], ["NAME", "--data-dir"]),
+        (["bench"], ["--repetitions", "--out FILE"]),
+    ],
+)
+def test_help_names_the_options_and_fits_the_terminal(capsys, args, named):
+    with pytest.raises(SystemExit) as caught:
+        main([*args, "--help"])
+    output = capsys.readouterr().out
+    assert caught.value.code == 0
+    for word in named:
+        assert word in output
