@@ -3,6 +3,7 @@
 import os
 import pickle
 from math import ceil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +11,12 @@ from dm_control.rl.control import PhysicsError
 from scenes import TINY, environment_of, stand, state_of, still, walk
 
 import tasks
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import Robot, Scenario
 from socialnav_mj.controllers import GoStraight, Limits
 from socialnav_mj.episode import Partner
 from socialnav_mj.geometry import Array, quaternion_of_yaw
 from socialnav_mj.physics import Physics, Touch
+from socialnav_mj.resources import assets_folder
 from socialnav_mj.rollout import rollout
 from socialnav_mj.scene import build_model
 
@@ -23,9 +25,11 @@ CONTACT_DISTANCE = 0.17 + 0.15  # [m]
 AWAY = (5.0, 5.0)
 
 
-def physics_of(n_agents: int = 1, n_pedestrians: int = 1, *, slippery: bool = False) -> Physics:
+def physics_of(
+    n_agents: int = 1, n_pedestrians: int = 1, *, slippery: bool = False, robot: str = Robot.model
+) -> Physics:
     """A pool with agent i standing at (0, 3 i); slippery: wheels without motor or grip, so that robots slide freely."""
-    scenario = Scenario()
+    scenario = Scenario(robot=Robot(model=robot))
     bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
     model = build_model(scenario, n_agent_slots=n_agents, n_pedestrian_slots=n_pedestrians, **bounds)
     if slippery:
@@ -136,6 +140,19 @@ def test_touch_counts_again_only_after_the_rearm_time_apart(apart: int, count: i
         assert touches[1].time == pytest.approx((3 + 5 + apart) * TIMESTEP)
 
 
+def test_normal_points_from_the_agent_whatever_order_mujoco_names_the_bodies_in(tmp_path: Path) -> None:
+    # MuJoCo names the simpler geom first: sphere, capsule, cylinder. With a cylinder the person comes first.
+    sphere, cylinder = 'type="sphere" size="0.17"', 'type="cylinder" size="0.17 0.05"'
+    text, file = (assets_folder() / "robot.xml").read_text(), tmp_path / "drum.xml"
+    assert sphere in text
+    file.write_text(text.replace(sphere, cylinder))
+    for model in (Robot.model, str(file)):
+        (touch,) = flicker(physics_of(robot=model), (True, 3))
+        assert touch.agent == 0 and touch.kind == Partner.PEDESTRIAN
+        np.testing.assert_allclose(touch.normal, [1.0, 0.0], atol=1e-6)
+        assert touch.impulse > 0.0
+
+
 def test_each_pair_is_counted_by_itself() -> None:
     physics = physics_of(n_agents=2, n_pedestrians=1)
     near = CONTACT_DISTANCE - 0.01
@@ -237,6 +254,14 @@ def test_path_of_the_wrong_length_is_refused() -> None:
     physics.set_pedestrian_path(np.zeros((3, 1, 2)), np.zeros((3, 1, 2)))
     with pytest.raises(ValueError, match="3 positions for 20 physics steps"):
         physics.step(20)
+
+
+def test_touches_of_before_a_reset_are_forgotten() -> None:
+    physics = physics_of()
+    physics.set_pedestrian_pose(np.array([0]), np.array([[0.3, 0.0]]), quaternion_of_yaw(np.zeros(1)))
+    physics.step(3)
+    physics.reset()
+    assert physics.new_touches() == []
 
 
 def test_new_physics_and_reset_have_every_slot_parked() -> None:

@@ -68,10 +68,10 @@ def test_spawn_waits_for_a_standing_person_and_the_deadline_runs_from_the_real_s
 
 
 def test_spawn_waits_until_a_passer_by_leaves_the_clearance() -> None:
-    # Away from the start at 0.5 m/s: 0.1 + 0.5 t >= 0.17 + 0.15 + 0.05 from t = 0.54 s on, control step 3.
-    environment = environment_of(walk([(0, 0), (5, 0)], 1.0), walk([(-0.1, 0), (-3.0, 0)], 0.5), agents=[1])
-    wait(environment, 5)
-    assert environment.task.spawn_step.tolist() == [3]
+    # Away from the start at 0.25 m/s: 0.1 + 0.25 t >= 0.17 + 0.15 + 0.05 from t = 1.08 s on, control step 6.
+    environment = environment_of(walk([(0, 0), (5, 0)], 1.0), walk([(-0.1, 0), (-3.0, 0)], 0.25), agents=[1])
+    wait(environment, 8)
+    assert environment.task.spawn_step.tolist() == [6]
 
 
 def test_spawn_waits_for_an_agent_in_the_place_and_keeps_the_order() -> None:
