@@ -107,9 +107,8 @@ class Evaluate:
             TextColumn("{task.description}"),
             BarColumn(bar_width=20),
             MofNCompleteColumn(),
-            _PaceColumn(pace),
-            TextColumn("in"),
             TimeElapsedColumn(),
+            _PaceColumn(pace),
         )
         with Progress(*columns, console=_errors) as progress:
             bar = progress.add_task("episodes", total=len(jobs))
