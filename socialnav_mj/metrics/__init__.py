@@ -12,9 +12,8 @@ from socialnav_mj.episode import Episode, Partner
 from socialnav_mj.metrics.collisions import NOBODY, collisions, first_partner
 from socialnav_mj.metrics.contacts import Fault
 from socialnav_mj.metrics.faults import (
-    collision_impulse,
     collisions_by_fault,
-    collisions_over_limit,
+    collisions_by_severity,
     largest_closing_speed,
     largest_peak_force,
     repeated_collisions,
@@ -53,6 +52,7 @@ from socialnav_mj.metrics.proximity import (
     minimum_distance,
     nearest_pedestrian_distance,
 )
+from socialnav_mj.metrics.severity import Severity
 from socialnav_mj.metrics.social_force import social_work
 from socialnav_mj.metrics.time_to_collision import minimum_time_to_collision
 
@@ -61,13 +61,13 @@ __all__ = [
     "NOBODY",
     "ZONES",
     "Fault",
+    "Severity",
     "active_steps",
     "arrived",
     "average_speed",
-    "collision_impulse",
     "collisions",
     "collisions_by_fault",
-    "collisions_over_limit",
+    "collisions_by_severity",
     "completion_censored",
     "completion_steps",
     "completion_time",
@@ -158,7 +158,6 @@ def per_agent(episode: Episode) -> dict[str, NDArray[Any]]:
         "struck_standing": struck_standing(episode),
         "largest_closing_speed": largest_closing_speed(episode),
         "largest_peak_force": largest_peak_force(episode),
-        "collision_impulse": collision_impulse(episode),
-        "collisions_over_limit": collisions_over_limit(episode),
+        **{f"collisions_{what.name.lower()}": collisions_by_severity(episode, what) for what in Severity},
         "spawn_delay": spawn_delay(episode),
     }

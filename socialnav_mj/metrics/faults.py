@@ -7,7 +7,7 @@ from socialnav_mj.episode import Episode, Partner
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.collisions import counted_contacts
 from socialnav_mj.metrics.contacts import Fault, fault, first_touch, standing
-from socialnav_mj.metrics.severity import Severity, severity
+from socialnav_mj.metrics.severity import Severity, clamped, severity
 
 Counts = NDArray[np.int64]
 
@@ -65,45 +65,32 @@ def largest_closing_speed(episode: Episode) -> Array:
 
 
 def largest_peak_force(episode: Episode) -> Array:
-    """Peak normal force of the hardest collision, with whomever; see `severity` for what it is worth.
+    """Peak normal force of the hardest collision that was not clamped; see `severity` for what it is worth.
 
     Args:
         episode: The record.
 
     Returns:
-        Shape (n_agents,); NaN for agents without a collision and in the human row [N].
+        Shape (n_agents,); NaN for agents without such a collision and in the human row [N].
     """
-    return _largest(episode, episode.contact_peak_force)
+    return _largest(episode, np.where(clamped(episode), np.nan, episode.contact_peak_force))
 
 
-def collision_impulse(episode: Episode) -> Array:
-    """Sum of the normal impulses of all collisions.
+def collisions_by_severity(episode: Episode, what: Severity) -> Array:
+    """Number of collisions with people of one class against ISO/TS 15066, by the simulated peak force.
+
+    Over the values of `what` they add up to `collisions(episode, Partner.PEDESTRIAN)`.
 
     Args:
         episode: The record.
+        what: The class.
 
     Returns:
-        Shape (n_agents,), >= 0; 0 for agents without a collision, NaN where there was no physics [N s].
+        Shape (n_agents,), whole numbers; NaN for agents with a collision without physics (human row).
     """
-    counted = counted_contacts(episode)
-    return np.bincount(
-        episode.contact_agent[counted], episode.contact_impulse[counted], minlength=episode.n_agents
-    ).astype(float)
-
-
-def collisions_over_limit(episode: Episode) -> Array:
-    """Number of collisions with people whose simulated force exceeds ISO/TS 15066's limit for the lower leg.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,), whole numbers; NaN where there was no physics.
-    """
-    person = episode.contact_partner_kind == Partner.PEDESTRIAN
-    over = severity(episode.contact_peak_force, episode.contact_duration) == Severity.OVER
-    unknown = _count(episode, person & np.isnan(episode.contact_peak_force)) > 0
-    return np.where(unknown, np.nan, _count(episode, person & over))
+    force = episode.contact_peak_force
+    unknown = _count(episode, (episode.contact_partner_kind == Partner.PEDESTRIAN) & np.isnan(force)) > 0
+    return np.where(unknown, np.nan, _count(episode, severity(episode, force) == what))
 
 
 def _count(episode: Episode, which: NDArray[np.bool_]) -> Counts:

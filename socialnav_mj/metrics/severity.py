@@ -6,16 +6,19 @@ the leg free to recoil. The limits are pain thresholds of adults, not of injury,
 (220 and 210 N/cm^2), which need a contact area that a simulation of two smooth bodies does not know.
 
 What the simulation's forces are, and are not: a replayed person is a mocap body, infinitely heavy and never pushed
-back, behind a soft contact (`solref 0.05 1`: a critically damped spring with a time constant of 0.05 s, whatever the
-mass). The robot is brought to the person's speed over about 0.1 s: without wheel forces the peak is m u / (0.05 s e),
-59 N for 8 kg at u = 1 m/s. Flesh on bone is some ten times stiffer. So the *impulse* and the *closing speed* are
-sound, the *peak force* is a lower bound for a free robot, and a robot clamped between two people is squeezed harder
-than people would squeeze it. `flesh_force` is the specification's own estimate from the closing speed.
+back, behind a soft contact (`solref 0.05 1`: critically damped, time constant 0.05 s, whatever the mass). The robot is
+brought to the person's speed over about 0.1 s, against its wheels' friction (up to 63 N sideways) and servo (32 N). In
+students003 (154 contacts of one draw, potential field) a free robot feels about 180 N per m/s of closing speed plus
+34 N, 556 N at most; flesh on bone would give 659 N per m/s (`flesh_force`). So *impulse* and *closing speed* are sound,
+and the *peak force* of a free robot is a lower bound. Between two people the robot is *clamped*: neither yields, the
+softness of the two contacts no longer lessens the force, and it reaches 27 000 N. That number means only that the
+people of the recording stood where the robot was; such contacts are counted by themselves (`clamped`), without a force.
 """
 
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialnav_mj.episode import Episode, IntArray, Partner
 from socialnav_mj.geometry import Array
@@ -43,6 +46,8 @@ class Severity(IntEnum):
     """At most 260 N, in a contact of at most 0.5 s."""
     OVER = 2
     """More than its kind of contact allows."""
+    CLAMPED = 3
+    """Between two bodies; the force has no meaning."""
 
 
 def flesh_force(episode: Episode) -> Array:
@@ -62,20 +67,38 @@ def flesh_force(episode: Episode) -> Array:
     return np.where(episode.contact_partner_kind == Partner.PEDESTRIAN, force, np.nan)
 
 
-def severity(force: Array, duration: Array) -> IntArray:
-    """Class of each contact.
+def clamped(episode: Episode) -> NDArray[np.bool_]:
+    """Whether the agent touched another body during the same contact.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (k,).
+    """
+    agent, begin = episode.contact_agent, episode.contact_time
+    end = begin + episode.contact_duration
+    together = (agent[:, None] == agent) & (begin[:, None] < end) & (begin < end[:, None])
+    np.fill_diagonal(together, False)
+    return together.any(axis=1)
+
+
+def severity(episode: Episode, force: Array) -> IntArray:
+    """Class of each contact with a person.
 
     A contact that lasted longer than 0.5 s is held against the quasi-static limit with its peak, although the peak may
     have come early: a strict reading, since the log keeps no force over time.
 
     Args:
-        force: Peak force, shape (k,) [N].
-        duration: Shape (k,) [s].
+        episode: The record.
+        force: Peak forces to judge, `episode.contact_peak_force` or `flesh_force(episode)`, shape (k,) [N].
 
     Returns:
-        Values of `Severity`, shape (k,); -1 where the force is NaN.
+        Values of `Severity`, shape (k,); -1 for contacts with agents and where the force is NaN.
     """
-    limit = np.where(duration > TRANSIENT_DURATION, QUASI_STATIC_FORCE, TRANSIENT_FORCE)
+    limit = np.where(episode.contact_duration > TRANSIENT_DURATION, QUASI_STATIC_FORCE, TRANSIENT_FORCE)
     classes = np.where(force > QUASI_STATIC_FORCE, Severity.UNDER_TRANSIENT, Severity.UNDER_QUASI_STATIC)
     classes = np.where(force > limit, Severity.OVER, classes)
-    return np.where(np.isnan(force), -1, classes).astype(np.int64)
+    classes = np.where(clamped(episode), Severity.CLAMPED, classes)
+    unknown = np.isnan(force) | (episode.contact_partner_kind != Partner.PEDESTRIAN)
+    return np.where(unknown, -1, classes).astype(np.int64)

@@ -21,7 +21,7 @@ ANGULAR_BRAKING = 3.0
 """n', of the braking force [1/m]."""
 
 _STRAIGHT = 1e-9
-"""Angles below this are straight ahead [rad]: rounding must not choose the side to which the force turns."""
+"""Angles nearer than this to 0 or pi have no side [rad]: rounding must not choose where the force turns."""
 
 
 def social_force(offset: Array, velocity: Array, *, turn: float = 1.0) -> Array:
@@ -48,7 +48,7 @@ def social_force(offset: Array, velocity: Array, *, turn: float = 1.0) -> Array:
     theta = np.arctan2(e[:, 0] * t[:, 1] - e[:, 1] * t[:, 0], np.einsum("kd,kd->k", e, t))
     reach = RANGE * length
     braking = np.exp(-d / reach - (ANGULAR_BRAKING * reach * theta) ** 2)
-    side = np.where(np.abs(theta) < _STRAIGHT, 0.0, np.sign(theta))
+    side = np.where(np.abs(np.sin(theta)) < _STRAIGHT, 0.0, np.sign(theta))
     turning = turn * side * np.exp(-d / reach - (ANGULAR * reach * theta) ** 2)
     left = np.stack([-t[:, 1], t[:, 0]], axis=-1)
     force = -MAGNITUDE * (braking[:, None] * t + turning[:, None] * left)

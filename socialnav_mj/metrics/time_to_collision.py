@@ -6,6 +6,9 @@ from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.pairs import pairs, radii
 
+_STILL = 1e-9
+"""Discs that approach more slowly never meet, before products of their velocities underflow [m/s]."""
+
 
 def disc_contact_time(offset: Array, velocity: Array, distance: float) -> Array:
     """When two discs that keep their velocities first touch.
@@ -25,7 +28,7 @@ def disc_contact_time(offset: Array, velocity: Array, distance: float) -> Array:
     b = np.einsum("...d,...d->...", offset, velocity)
     c = np.einsum("...d,...d->...", offset, offset) - distance**2
     root = b * b - a * c
-    meets = (c > 0.0) & (b < 0.0) & (root >= 0.0)
+    meets = (c > 0.0) & (b < 0.0) & (root >= 0.0) & (a > _STILL**2)
     time = np.divide(c, np.sqrt(np.maximum(root, 0.0)) - b, out=np.full(c.shape, np.inf), where=meets)
     return np.where(c <= 0.0, 0.0, time)
 

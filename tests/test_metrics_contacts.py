@@ -1,0 +1,161 @@
+"""Contact truth by hand: who moved into whom, where, how often, how hard."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from episodes import Agent, Pedestrian, Touch, build_episode, line
+from hypothesis import given
+from hypothesis import strategies as st
+
+from socialnav_mj import metrics
+from socialnav_mj.episode import Partner
+from socialnav_mj.metrics import contacts, severity
+from socialnav_mj.metrics.contacts import Fault
+from socialnav_mj.metrics.severity import Severity
+from socialnav_mj.resources import assets_folder
+
+
+def meeting(agent_speed, person_speed, *, side=0.0, **touch):
+    """The agent at the origin facing east, the person 0.3 m east of it, each with a speed along x; one touch."""
+    agent = Agent(positions=line((0, 0), (agent_speed, side), 5), goal=(9, 9))
+    person = Pedestrian(positions=line((0.3, 0), (0.3 + person_speed, 0), 5))
+    return build_episode([agent], [person], [Touch(agent=0, partner=0, step=0, **touch)])
+
+
+@pytest.mark.parametrize(
+    ("agent_speed", "person_speed", "who"),
+    [
+        (1.0, 0.0, Fault.AGENT),  # drives into somebody standing
+        (1.0, 0.5, Fault.AGENT),  # runs into somebody who walks away more slowly
+        (0.0, -1.0, Fault.PARTNER),  # is walked into
+        (-0.5, -1.0, Fault.PARTNER),  # is caught up from ahead while backing off
+        (1.0, -1.0, Fault.BOTH),
+        (0.05, -0.05, Fault.NEITHER),
+        (0.0999, -0.1001, Fault.PARTNER),  # the threshold is 0.1 m/s
+    ],
+)
+def test_fault_is_who_moved_towards_the_other(agent_speed, person_speed, who):
+    episode = meeting(agent_speed, person_speed)
+    assert contacts.fault(episode).tolist() == [who]
+    own, other = contacts.approach_speeds(episode)
+    assert (own[0], other[0]) == pytest.approx((agent_speed, -person_speed))
+    assert own + other == pytest.approx(episode.contact_closing_speed)
+    counts = [metrics.collisions_by_fault(episode, Partner.PEDESTRIAN, f)[0] for f in Fault]
+    assert counts == [int(f == who) for f in Fault]
+
+
+def test_what_is_fault_of_one_agent_is_the_other_ones_partners():
+    agents = [Agent(positions=line((0, 0), (1, 0), 5)), Agent(positions=np.tile((0.3, 0), (6, 1)), goal=(3, 0))]
+    episode = build_episode(agents, touches=[Touch(agent=0, partner=1, step=1, kind=Partner.AGENT)])
+    assert contacts.fault(episode).tolist() == [Fault.AGENT, Fault.PARTNER]
+    assert metrics.collisions_by_fault(episode, Partner.AGENT, Fault.AGENT).tolist() == [1, 0]
+    assert metrics.collisions_by_fault(episode, Partner.AGENT, Fault.PARTNER).tolist() == [0, 1]
+    assert metrics.struck_standing(episode).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("where", "angle"), [((1, 0), 0), ((0, 1), math.pi / 2), ((0, -1), -math.pi / 2), ((-1, 0), -math.pi)]
+)
+def test_bearing_is_zero_ahead_and_positive_on_the_left(where, angle):
+    way = line((0, 0), (0, 1), 5)  # north
+    turned = (where[1] * -0.3, where[0] * 0.3)
+    person = Pedestrian(positions=np.tile(turned, (6, 1)))
+    episode = build_episode([Agent(positions=way)], [person], [Touch(agent=0, partner=0, step=0)])
+    found = float(contacts.bearing(episode)[0])
+    assert math.cos(found) == pytest.approx(math.cos(angle)) and math.sin(found) == pytest.approx(math.sin(angle))
+
+
+def test_second_touch_of_a_pair_is_repeated_and_the_first_of_another_is_not():
+    people = [Pedestrian(positions=np.tile((2, 0), (21, 1))), Pedestrian(positions=np.tile((3, 0), (21, 1)))]
+    agents = [Agent(positions=line((0, 0), (4, 0), 20)), Agent(positions=line((0, 5), (4, 5), 20))]
+    touches = [Touch(agent=0, partner=j, step=step) for j, step in ((0, 8), (0, 9), (1, 12), (0, 13))]
+    episode = build_episode(agents, people, [*touches, Touch(agent=1, partner=0, step=15)])
+    assert contacts.first_touch(episode).tolist() == [True, False, True, False, True]
+    assert metrics.repeated_collisions(episode).tolist() == [2, 0]
+
+
+def test_agent_that_drives_is_not_struck_standing_and_neither_is_one_that_nobody_walked_into():
+    assert metrics.struck_standing(meeting(0.05, -1.0)).tolist() == [True]
+    assert metrics.struck_standing(meeting(-0.5, -1.0)).tolist() == [False]
+    assert metrics.struck_standing(meeting(0.05, -0.05)).tolist() == [False]
+    # standing is speed in any direction: here 0.5 m/s sideways
+    assert metrics.struck_standing(meeting(0.0, -1.0, side=0.5)).tolist() == [False]
+
+
+@pytest.mark.parametrize(
+    ("force", "duration", "what"),
+    [
+        (130.0, 9.0, Severity.UNDER_QUASI_STATIC),
+        (131.0, 0.5, Severity.UNDER_TRANSIENT),
+        (260.0, 0.5, Severity.UNDER_TRANSIENT),
+        (131.0, 0.51, Severity.OVER),
+        (261.0, 0.1, Severity.OVER),
+    ],
+)
+def test_severity_is_130_newtons_and_260_for_half_a_second(force, duration, what):
+    episode = meeting(0.0, -1.0, peak_force=force, duration=duration)
+    assert severity.severity(episode, episode.contact_peak_force).tolist() == [what]
+    assert metrics.collisions_by_severity(episode, what).tolist() == [1.0]
+    assert metrics.largest_peak_force(episode).tolist() == [force]
+
+
+def test_contact_during_another_is_clamped_and_its_force_not_told():
+    people = [Pedestrian(positions=np.tile((x, 0), (21, 1))) for x in (0.3, -0.3)]
+    agent = Agent(positions=np.zeros((21, 2)), goal=(3, 0))
+    touches = [Touch(agent=0, partner=0, step=5, duration=0.4, peak_force=9000), Touch(agent=0, partner=1, step=6)]
+    episode = build_episode([agent], people, [*touches, Touch(agent=0, partner=0, step=9, peak_force=50)])
+    assert severity.clamped(episode).tolist() == [True, True, False]
+    assert metrics.largest_peak_force(episode).tolist() == [50.0]
+    assert [metrics.collisions_by_severity(episode, what)[0] for what in Severity] == [1, 0, 0, 2]
+
+
+def test_human_row_has_no_force_and_no_severity():
+    episode = meeting(0.0, -1.0, peak_force=math.nan, impulse=math.nan)
+    assert np.isnan(metrics.collisions_by_severity(episode, Severity.OVER)).all()
+    assert np.isnan(metrics.largest_peak_force(episode)).all()
+    assert metrics.largest_closing_speed(episode) == pytest.approx([1.0])
+
+
+@given(speed=st.floats(0.01, 3))
+def test_flesh_force_holds_the_energy_of_the_impact(speed):
+    """ISO/TS 15066 A.3: F^2 / (2 k) = mu v^2 / 2."""
+    force = float(severity.flesh_force(meeting(0.0, -speed))[0])
+    reduced = severity.ROBOT_MASS * severity.LEG_MASS / (severity.ROBOT_MASS + severity.LEG_MASS)
+    assert force**2 / severity.LEG_STIFFNESS == pytest.approx(reduced * speed**2)
+    assert force == pytest.approx(659 * speed, rel=1e-3)
+
+
+def test_robot_mass_is_the_models():
+    masses = re.findall(r'<inertial[^>]*?mass="([0-9.]+)"', (assets_folder() / "robot.xml").read_text())
+    assert sum(map(float, masses)) == pytest.approx(severity.ROBOT_MASS)
+
+
+@pytest.mark.parametrize(("gap", "met"), [(0.31, True), (0.33, False)])
+def test_pedestrians_overlap_between_samples_too(gap, met):
+    """Two people pass each other at 2 m/s halfway between two samples, then 0.4 m apart."""
+    there = Pedestrian(positions=line((-1.0, 0), (1.0, 0), 5))
+    back = Pedestrian(positions=line((1.0, gap), (-1.0, gap), 5))
+    aside = Pedestrian(positions=np.tile((0, 5), (6, 1)))
+    episode = build_episode([Agent(positions=np.tile((9, 9), (6, 1)), goal=(0, 9))], [there, back, aside])
+    assert contacts.pedestrian_overlaps(episode).tolist() == [int(met), int(met), 0]
+
+
+def test_geometry_sees_an_overlap_between_samples():
+    agent = Agent(positions=line((-1.0, 0), (1.0, 0), 5))
+    person = Pedestrian(positions=line((1.0, 0.31), (-1.0, 0.31), 5))
+    episode = build_episode([agent], [person, Pedestrian(positions=np.tile((0, 5), (6, 1)))])
+    assert contacts.geometric_contacts(episode).tolist() == [[True, False]]
+    apart = replace(episode, pedestrian_position=episode.pedestrian_position + np.array([0, 0.02]))
+    assert not contacts.geometric_contacts(apart).any()
+
+
+def test_episode_without_contacts_or_people_has_empty_truths():
+    episode = build_episode([Agent(positions=line((0, 0), (4, 0), 20))])
+    for truth in (contacts.fault, contacts.bearing, contacts.first_touch, contacts.standing, severity.clamped):
+        assert truth(episode).shape == (0,)
+    assert contacts.geometric_contacts(episode).shape == (1, 0)
+    assert contacts.pedestrian_overlaps(episode).shape == (0,)
+    assert np.isnan(metrics.minimum_time_to_collision(episode)).all()
