@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 from dm_control.rl.control import PhysicsError
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Column, Table
 from rich.text import Text
 
@@ -318,12 +327,68 @@ class Bench:
             write_whole(self.out, (json.dumps(content, indent=1) + "\n").encode())
 
 
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Learn a reward and a policy from recorded people; goes on with a training that was stopped."""
+
+    method: tyro.conf.Positional[Literal["replay-irl"]]
+    """What to train."""
+    dataset: tuple[str, ...] = ("plaza",)
+    """Recordings to learn from: names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    features: Literal["continuous", "risk"] = "continuous"
+    """Feature set of policy and reward."""
+    partition: Literal["fused", "importance", "segment"] = "fused"
+    """Estimate of the partition function."""
+    seed: int = 0
+    """Of networks, exploration, sampling and draws."""
+    scene_steps: int | None = None
+    """Control steps of the training scene; the committed configuration's by default."""
+    out: Folder = None
+    """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
+
+    def run(self) -> None:
+        """Train."""
+        try:
+            from socialnav_mj.learning.config import TrainingConfig
+            from socialnav_mj.learning.training import Progress as Step
+            from socialnav_mj.learning.training import train
+        except ImportError as error:
+            raise RuntimeError(
+                f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
+            ) from error
+        settings = {} if self.scene_steps is None else {"scene_steps": self.scene_steps}
+        config = TrainingConfig(
+            datasets=self.dataset, features=self.features, partition=self.partition, seed=self.seed, **settings
+        )
+        label = "+".join(Path(name).stem for name in self.dataset)
+        out = self.out or Path("runs") / "train" / f"{label}_{self.features}_seed{self.seed}"
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=_errors) as progress:
+            bar = progress.add_task("scene steps", total=config.scene_steps)
+
+            def report(step: Step) -> None:
+                progress.update(bar, completed=step.scene_steps)
+                if step.validation is not None:
+                    v = step.validation
+                    _print(
+                        f"{step.scene_steps} scene steps, {step.transitions} transitions: validation success "
+                        f"{v['success']:.3f}, share of steps within 1.2 m {v['intrusion_share']:.3f}",
+                        progress.console,
+                    )
+
+            best = train(config, out, data_dir=None if self.data_dir is None else str(self.data_dir), progress=report)
+        _print(f"policy: {best}\nuse it: --controllers \"replay_irl(policy='{best}')\"")
+
+
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[List, tyro.conf.subcommand("list")]
     | Annotated[Data, tyro.conf.subcommand("data")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
 )
 
 

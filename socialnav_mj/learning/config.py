@@ -16,20 +16,22 @@ class TrainingConfig:
     """Part of each recording that is learned from, as shares of its duration."""
     validation_window: tuple[float, float] = (0.6, 0.7)
     """Part that the best checkpoint is chosen on."""
+    test_window: tuple[float, float] = (0.7, 1.0)
+    """Part that nothing is learned or chosen on; the card's held-out figures."""
     features: str = "continuous"
     """Feature set of policy and reward."""
     seed: int = 0
     """Of networks, exploration, sampling and draws."""
 
-    scene_steps: int = 9000
+    scene_steps: int = 7200
     """Control steps of the training scene; every agent under way gives a transition at each."""
-    shares: tuple[float, ...] = (0.15, 0.3, 0.5)
+    shares: tuple[float, ...] = (0.3, 0.5, 0.7)
     """Shares of replaced people; the scenes take turns."""
     n_slots: int = 64
     """Environments of the vector environment, at most as many agents at once; draws that need more are passed over."""
     robot_radius: float = 0.22
     """Of the robots in the training scene, larger than in the evaluation, so that the policy keeps a margin [m]."""
-    pedestrian_radius: float = 0.25
+    pedestrian_radius: float = 0.28
     """Of people in the training scene, likewise [m]."""
 
     hidden: tuple[int, ...] = (64, 64)
@@ -46,8 +48,14 @@ class TrainingConfig:
     """SAC updates after each control step of the scene."""
     updates_per_reward_step: int = 4
     """SAC updates between two reward steps."""
-    random_scene_steps: int = 200
-    """Control steps with uniformly random actions before any update."""
+    guided_scene_steps: int = 1200
+    """Control steps before any update, in which the guide acts instead of the actor."""
+    guide: str = "potential_field"
+    """Controller that fills the buffer at first; from uniformly random actions SAC learned to freeze before people."""
+    guide_noise: float = 0.4
+    """Standard deviation of the normal noise on the guide's actions, in [-1, 1] units."""
+    target_entropy: float = -0.5
+    """Of SAC's automatic temperature; SAC's own default for two actions is -2."""
     buffer_size: int = 300_000
     """Transitions that the shared replay buffer holds."""
 

@@ -11,11 +11,11 @@ from stable_baselines3.common.vec_env import VecEnv
 
 import tasks
 from socialnav_mj.cast import NOBODY, cast_recording
-from socialnav_mj.controllers import Limits
+from socialnav_mj.controllers import Limits, make_controller
 from socialnav_mj.environment import make_scenario
 from socialnav_mj.episode import Outcome
 from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG, FeatureSet, absorbing_state, running_state, view_of
-from socialnav_mj.geometry import Array
+from socialnav_mj.geometry import Array, twist_of_wheel_speed
 from socialnav_mj.recordings import Recording
 
 _MOST_DRAWS = 1000
@@ -40,6 +40,7 @@ class CrowdVecEnv(VecEnv):
         n_slots: int,
         robot_radius: float,
         pedestrian_radius: float,
+        guide: str,
         seed: int,
     ) -> None:
         """Build the first scene.
@@ -51,8 +52,10 @@ class CrowdVecEnv(VecEnv):
             n_slots: Number of environments; draws that need more are passed over.
             robot_radius: [m].
             pedestrian_radius: [m].
+            guide: Controller that `guide_action` asks.
             seed: Of the draws.
         """
+        self._guide = make_controller(guide)
         self._recordings, self._shares, self._features = tuple(recordings), tuple(shares), features
         self._task_kwargs: dict[str, Any] = {
             "robot_radius": robot_radius,
@@ -84,6 +87,7 @@ class CrowdVecEnv(VecEnv):
                 "agents at once; allow more slots or a smaller share"
             )
         self._limits = Limits.of(scenario)
+        self._guide.reset(self._limits, seed=seed)
         return tasks.load("scenario_1", {**self._task_kwargs, "dataset": recording, "share": share, "seed": seed})
 
     def reset(self) -> NDArray[np.float32]:
@@ -132,6 +136,20 @@ class CrowdVecEnv(VecEnv):
             self.environment = self._next_scene()
             states = self.reset()
         return states, rewards, dones, infos
+
+    def guide_action(self) -> Array:
+        """What the guide would do now.
+
+        Returns:
+            (speed, turn) in [-1, 1], shape (n_slots, 2); 0 in empty slots.
+        """
+        task = self.environment.task
+        wheel_speed = self._guide.act(task.get_observation(self.environment.physics))
+        twist = twist_of_wheel_speed(wheel_speed, wheel_radius=self._limits.wheel_radius, track=self._limits.track)
+        action = np.zeros((self.num_envs, 2))
+        action[: len(twist), 0] = 2.0 * twist[:, 0] / self._limits.max_speed - 1.0
+        action[: len(twist), 1] = twist[:, 1] / self._limits.max_yaw_rate
+        return action
 
     def _twist(self, actions: Array) -> Array:
         return np.stack(

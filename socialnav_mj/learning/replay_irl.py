@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
+from stable_baselines3.common.noise import ActionNoise
 
 from socialnav_mj.features import FeatureSet
 from socialnav_mj.learning.config import TrainingConfig
@@ -28,9 +29,6 @@ from socialnav_mj.learning.reward import (
     log_partition_importance,
 )
 from socialnav_mj.learning.shared_buffer import SharedReplayBuffer, mirrored
-
-_UNIFORM_LOG_PROB = -2.0 * math.log(2.0)
-"""Log density of a uniformly random action in [-1, 1]^2."""
 
 
 class ReplayIRL(SAC):
@@ -47,13 +45,14 @@ class ReplayIRL(SAC):
             features: Of environment and experts.
             config: Of the training.
         """
-        self.config, self.features = config, features
+        self.config, self.features, self.crowd = config, features, env
         super().__init__(
             "MlpPolicy",
             env,
             learning_rate=lambda left: config.learning_rate * (0.1 + 0.9 * left),
             buffer_size=config.buffer_size,
-            learning_starts=config.random_scene_steps * env.num_envs,
+            learning_starts=config.guided_scene_steps * env.num_envs,
+            target_entropy=config.target_entropy,
             batch_size=config.batch_size,
             tau=config.tau,
             gamma=config.gamma,
@@ -78,6 +77,27 @@ class ReplayIRL(SAC):
         """CPU-bound time spent so far, by kind [s]."""
         self.updates = 0
         """SAC updates so far."""
+
+    def _sample_action(
+        self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The actor's action, or before learning starts the guide's with noise.
+
+        Args:
+            learning_starts: Time steps of the guide.
+            action_noise: Not used with the guide.
+            n_envs: Number of slots.
+
+        Returns:
+            The action, twice: actions are not rescaled.
+        """
+        if self.num_timesteps >= learning_starts:
+            return super()._sample_action(learning_starts, action_noise, n_envs)
+        noise = self.random.normal(size=(n_envs, 2))
+        sigma = self.config.guide_noise
+        self._guide_log_prob = -0.5 * (noise**2).sum(axis=1) - 2.0 * math.log(sigma * math.sqrt(2.0 * math.pi))
+        action = np.clip(self.crowd.guide_action() + sigma * noise, -1.0, 1.0).astype(np.float32)
+        return action, action
 
     def _store_transition(
         self,
@@ -109,8 +129,9 @@ class ReplayIRL(SAC):
         self._last_obs = self._last_original_obs = new_obs
 
     def _log_prob(self, observation: NDArray[Any], action: NDArray[Any]) -> NDArray[Any]:
-        if self.num_timesteps <= self.learning_starts:
-            return np.full(len(action), _UNIFORM_LOG_PROB, dtype=np.float32)
+        # The step's time steps are counted before its transitions are stored.
+        if self.num_timesteps - self.n_envs < self.learning_starts:
+            return self._guide_log_prob
         with torch.no_grad():
             mean, log_std, _ = self.actor.get_action_dist_params(torch.as_tensor(observation))
             distribution = SquashedDiagGaussianDistribution(action.shape[1]).proba_distribution(mean, log_std)

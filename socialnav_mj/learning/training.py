@@ -99,6 +99,7 @@ def train(
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
+        guide=config.guide,
         # A resumed training goes on with scenes it has not seen.
         seed=config.seed + 1_000_003 * len(done),
     )
@@ -111,7 +112,21 @@ def train(
     if left > 0:
         callback = _Checkpoints(config, folder, recordings, done, progress)
         model.learn(left, callback=callback, reset_num_timesteps=False, log_interval=1)
+    _complete_card(folder / BEST, config, recordings)
     return folder / BEST
+
+
+def _complete_card(path: Path, config: TrainingConfig, recordings: list[Recording]) -> None:
+    """Add what the best policy does on the parts it was trained on, chosen on, and has never seen."""
+    card_path = path.with_suffix(".json")
+    card = json.loads(card_path.read_text())
+    parts = {"in_sample": config.train_window, "validation": config.validation_window, "held_out": config.test_window}
+    card["metrics"] = {
+        name: {"window": part, **validate(path, recordings, part=part, shares=config.validation_shares)}
+        for name, part in parts.items()
+    }
+    card["history"] = _read_history(path.parent)
+    write_whole(card_path, (json.dumps(card, indent=1, sort_keys=True) + "\n").encode())
 
 
 def validate(
@@ -239,7 +254,7 @@ class _Checkpoints(BaseCallback):
         }
         self._outcomes = []
         if score > best:
-            save_policy(model, folder / BEST, {**card, "validation": validation, "score": score})
+            save_policy(model, folder / BEST, {**card, "score": score})
         for name in ("success", "intrusion_share", "time_under_way"):
             model.logger.record(f"validation/{name}", validation[name])
         for name in ("training_arrived", "training_timed_out", "training_collided"):
