@@ -90,7 +90,7 @@ def test_turn_on_the_spot_is_clipped_to_the_robots_limit():
 def test_people_who_go_nowhere_are_seen_but_are_no_experts():
     found = demonstrations(walk([(0.0, 0.0), (4.0, 0.0)], 1.0), walk([(2.0, 2.0), (3.5, 2.0)], 0.5))
     assert len(found.absorbed) == 1 and len(found.running) == 18
-    with pytest.raises(ValueError, match="nobody in recording 'made' moves 2.0 m; there is no expert"):
+    with pytest.raises(ValueError, match=r"nobody in recording 'made' moves 2\.0 m; there is no expert"):
         demonstrations(stand((0.0, 0.0), 0.0, 5.0))
 
 
