@@ -358,9 +358,12 @@ class Train:
             raise RuntimeError(
                 f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
             ) from error
-        settings = {} if self.scene_steps is None else {"scene_steps": self.scene_steps}
         config = TrainingConfig(
-            datasets=self.dataset, features=self.features, partition=self.partition, seed=self.seed, **settings
+            datasets=self.dataset,
+            features=self.features,
+            partition=self.partition,
+            seed=self.seed,
+            scene_steps=self.scene_steps or TrainingConfig.scene_steps,
         )
         label = "+".join(Path(name).stem for name in self.dataset)
         out = self.out or Path("runs") / "train" / f"{label}_{self.features}_seed{self.seed}"

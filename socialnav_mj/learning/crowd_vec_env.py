@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from dm_control.rl import control
 from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
@@ -12,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 import tasks
 from socialnav_mj.cast import NOBODY, cast_recording
 from socialnav_mj.controllers import Limits, make_controller
-from socialnav_mj.environment import make_scenario
+from socialnav_mj.environment import Environment, make_scenario
 from socialnav_mj.episode import Outcome
 from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG, FeatureSet, absorbing_state, running_state, view_of
 from socialnav_mj.geometry import Array, twist_of_wheel_speed
@@ -72,7 +71,7 @@ class CrowdVecEnv(VecEnv):
         )
         self.environment = self._next_scene()
 
-    def _next_scene(self) -> control.Environment:
+    def _next_scene(self) -> Environment:
         recording = self._recordings[self._scenes % len(self._recordings)]
         share = self._shares[self._scenes // len(self._recordings) % len(self._shares)]
         self._scenes += 1
