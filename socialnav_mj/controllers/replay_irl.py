@@ -117,14 +117,24 @@ def load_policy(name_or_path: str) -> TrainedPolicy:
         )
     except (OSError, ValueError, KeyError, TypeError, SafetensorError) as error:
         raise PolicyError(f"{path} and its card {path.with_suffix('.json').name} are no policy: {error!r}") from error
-    size = features.size + 2
     for network, layers, outputs in (("actor", policy.actor, 2), ("reward", policy.reward, 1)):
-        found = (layers[0][0].shape[1], layers[-1][0].shape[0])
-        if found != (size, outputs):
-            raise PolicyError(
-                f"{path}: the {network} maps {found[0]} to {found[1]} numbers; expected {size} to {outputs}"
-            )
+        _check(path, network, layers, features.size + 2, outputs)
     return policy
+
+
+def _check(path: Path, network: str, layers: tuple[tuple[Array, Array], ...], inputs: int, outputs: int) -> None:
+    """Refuse layers that do not follow one another from so many inputs to so many outputs, or hold no numbers."""
+    width = inputs
+    for i, (weight, bias) in enumerate(layers):
+        if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
+            raise PolicyError(
+                f"{path}: {network}.{i} has weight {weight.shape} and bias {bias.shape}; expected (n, {width}) and (n,)"
+            )
+        if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+            raise PolicyError(f"{path}: {network}.{i} holds values that are not finite")
+        width = weight.shape[0]
+    if width != outputs:
+        raise PolicyError(f"{path}: the {network} maps {inputs} to {width} numbers; expected {inputs} to {outputs}")
 
 
 def _layers(tensors: dict[str, NDArray[Any]], network: str) -> tuple[tuple[Array, Array], ...]:

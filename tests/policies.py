@@ -1,0 +1,41 @@
+"""Policy files made by hand."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors.numpy import save_file
+
+from socialnav_mj.features import N_FLAGS, feature_set
+
+
+def random_tensors(features: str = "continuous", hidden: tuple[int, ...] = (8, 8), seed: int = 0):
+    """Weights of an actor and a reward network, by name."""
+    random = np.random.default_rng(seed)
+    tensors: dict[str, NDArray[np.float32]] = {}
+    for network, outputs in (("actor", 2), ("reward", 1)):
+        widths = (feature_set(features).size + N_FLAGS, *hidden, outputs)
+        for i, (before, after) in enumerate(pairwise(widths)):
+            weight = random.normal(scale=before**-0.5, size=(after, before))
+            tensors[f"{network}.{i}.weight"] = weight.astype(np.float32)
+            tensors[f"{network}.{i}.bias"] = random.normal(scale=0.1, size=after).astype(np.float32)
+    return tensors
+
+
+def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed: int = 0) -> str:
+    """Write NAME.safetensors and its card.
+
+    Args:
+        path: Of the .safetensors file.
+        tensors: By name; random ones if not given.
+        features: Name of the feature set.
+        seed: Of the random ones.
+
+    Returns:
+        The path, as `load_policy` takes it.
+    """
+    save_file(random_tensors(features, seed=seed) if tensors is None else tensors, path)
+    path.with_suffix(".json").write_text(json.dumps({"config": {"features": features}}))
+    return str(path)
