@@ -1,4 +1,4 @@
-"""Run folder -> agents.parquet, summary.csv, summary.json, report.md and traces; everything but the episodes."""
+"""Run folder -> agents.parquet, summaries, report.md, tables, figures and traces; everything but the episodes."""
 
 import csv
 import io
@@ -17,6 +17,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from socialnav_mj.analysis.draws import resolutions
+from socialnav_mj.analysis.paired import paired_differences
+from socialnav_mj.analysis.paired_figure import paired_figure
+from socialnav_mj.analysis.sections import draws_section, fault_section, paired_section, severity_section
 from socialnav_mj.analysis.statistics import Estimate, summarise
 from socialnav_mj.analysis.tables import Results, Source, read_results, scenario_configuration
 from socialnav_mj.episode import Episode
@@ -25,6 +29,7 @@ from socialnav_mj.files import write_whole
 SUMMARY_FORMAT = "socialnav_mj.summary/1"
 RUN_FILE = "run.json"
 """Written beside the episodes by whoever made them: {"command": "...", "controllers": ["in", "their", "order"]}."""
+_FIGURE = "figures/paired_humans"
 
 _COLUMNS = (
     ("success", "success", 3),
@@ -56,7 +61,8 @@ _HOW_TO_READ = """\
 Every cell is the mean over draws ± its standard error; a draw is one random choice of the people who are replaced, \
 and its mean over agents is one number. The 95 % interval is a bootstrap over draws (none for fewer than 3 draws, too \
 narrow for fewer than about 10). Controllers that share draws drove the same agents, so compare them draw by draw \
-(`agents.parquet`).
+(`agents.parquet`). All other measures, defined in docs/metrics.md, are in `summary.csv`; every collision is a row of \
+`tables/collisions.parquet`.
 
 - **human**: the recorded people themselves, each on its own track instead of the agent that replaced it, scored by \
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
@@ -97,12 +103,22 @@ def write_report(folder: str | Path, *, console: Console | None = None, n_jobs: 
     command, controllers = _read_run_file(folder / RUN_FILE)
     results = read_results(folder, controllers=controllers, n_jobs=n_jobs)
     estimates = summarise(results.agents)
+    differences = paired_differences(results.agents)
     summary = _summary(results, estimates, command)
+    sections = [
+        *paired_section(differences, f"{_FIGURE}.svg"),
+        *fault_section(results.agents, results.contacts, results.overlaps),
+        *severity_section(results.contacts),
+        *draws_section(resolutions(results.agents)),
+    ]
     files = {
         "agents.parquet": _parquet(results.agents),
+        "tables/collisions.parquet": _parquet(results.contacts),
+        "tables/paired.csv": _csv(differences).encode(),
+        **{f"{_FIGURE}.{kind}": content for kind, content in paired_figure(differences).items()},
         "summary.csv": _csv(estimates).encode(),
         "summary.json": (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode(),
-        "report.md": _markdown(summary, estimates).encode(),
+        "report.md": _markdown(summary, estimates, sections).encode(),
     }
     for name, content in files.items():
         write_whole(folder / name, content)
@@ -212,7 +228,7 @@ def _warnings(sources: Sequence[Source]) -> list[str]:
     return warnings
 
 
-def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate]) -> str:
+def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: Sequence[str]) -> str:
     lines = ["# Report", ""]
     lines += [f"Command: `{summary['command']}`" if summary["command"] else "Command: not recorded (no run.json)."]
     lines += ["", "Made from the episode files alone; `socialnav-mj report FOLDER` makes it again.", ""]
@@ -231,6 +247,7 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate]) -> str:
             counts = [str(row["success"].n_draws), str(row["success"].n_agents)]
             lines.append(_row([controller, cells[0], _interval(row["success"]), *cells[1:], *counts]))
         lines.append("")
+    lines += sections
     lines += ["## How to read it", "", _HOW_TO_READ, "## Traceability", "", "Recordings:", ""]
     lines += [f"- {r['name']}, variant {r['variant']}, checksum {r['checksum']}" for r in summary["recordings"]]
     lines += ["", "Versions:", ""]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -39,10 +40,37 @@ MEASURES: dict[str, Callable[[Columns], Array]] = {
     "collisions_pedestrian": lambda c: c["collisions_pedestrian"],
     "collisions_agent": lambda c: c["collisions_agent"],
     "spawn_delay": lambda c: c["spawn_delay"],
+    **{
+        name: itemgetter(name)
+        for name in (
+            "spl",
+            "path_irregularity",
+            "failures_to_progress",
+            "maximum_speed",
+            "mean_acceleration",
+            "maximum_acceleration",
+            "mean_jerk",
+            "maximum_jerk",
+            "time_not_moving",
+            "mean_distance",
+            "intimate_zone_share",
+            "personal_zone_share",
+            "social_zone_share",
+            "public_zone_share",
+            "space_compliance",
+            "minimum_time_to_collision",
+            "social_work",
+            "repeated_collisions",
+            "struck_standing",
+            "largest_closing_speed",
+            "largest_peak_force",
+        )
+    },
 }
 """What is averaged: value of every agent, NaN where it has none. `completion_time` is over arrivals, `..._success` over
 successes alone, `time_under_way` over everybody who spawned, time-outs censored. `intrusion_share` weighs agents
-equally, `intrusion_share_of_steps` weighs active steps equally."""
+equally, `intrusion_share_of_steps` weighs active steps equally. `minimum_time_to_collision` is over agents that were
+ever on collision course, `largest_...` over agents with a collision."""
 
 WEIGHTS: dict[str, str] = {"intrusion_share_of_steps": "active_steps"}
 """Columns that weigh agents within a draw; all others weigh equally."""
@@ -85,7 +113,7 @@ def summarise(agents: pa.Table) -> list[Estimate]:
     """
     return [
         estimate(values, weights, draws, labels={**labels, "measure": measure})
-        for labels, columns, draws in _groups(agents)
+        for labels, columns, draws in groups(agents)
         for measure, values, weights in _measured(columns)
     ]
 
@@ -140,14 +168,22 @@ def estimate(values: Array, weights: Array, draws: NDArray[np.int64], *, labels:
     )
 
 
-def _groups(agents: pa.Table) -> Iterator[tuple[dict[str, str], Columns, NDArray[np.int64]]]:
+def groups(table: pa.Table) -> Iterator[tuple[dict[str, str], Columns, NDArray[np.int64]]]:
+    """Rows of one controller in one scenario together.
+
+    Args:
+        table: Has the columns dataset, variant, scenario, controller and draw.
+
+    Yields:
+        What the rows share, their columns (null numbers are NaN) and their draws, in the order of first appearance.
+    """
     names = ("dataset", "variant", "scenario", "controller")
-    keys = list(zip(*(agents[name].to_pylist() for name in names), strict=True))
+    keys = list(zip(*(table[name].to_pylist() for name in names), strict=True))
     rows: dict[tuple[str, ...], list[int]] = {}
     for row, key in enumerate(keys):
         rows.setdefault(key, []).append(row)
     for key, chosen in rows.items():
-        part = agents.take(chosen)
+        part = table.take(chosen)
         columns = {name: part[name].to_numpy() for name in part.column_names}
         yield dict(zip(names, key, strict=True)), columns, columns["draw"]
 

@@ -11,11 +11,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from socialnav_mj.analysis.contact_table import contacts_table
+from socialnav_mj.analysis.paired import HUMAN, HUMAN_COLUMNS, pair_with_humans
 from socialnav_mj.episode import Episode, EpisodeError, Partner
-from socialnav_mj.metrics import per_agent
-
-HUMAN = "human"
-"""Name of the controller under which the recorded people themselves are scored."""
+from socialnav_mj.metrics import ZONES, Fault, Severity, per_agent
+from socialnav_mj.metrics.contacts import pedestrian_overlaps
 
 SCHEMA = pa.schema(
     [
@@ -47,12 +47,38 @@ SCHEMA = pa.schema(
         ("collisions_agent", pa.int64()),
         ("first_partner", pa.string()),
         ("spawn_delay", pa.float64()),
+        ("spl", pa.float64()),
+        ("path_irregularity", pa.float64()),
+        ("failures_to_progress", pa.int64()),
+        ("maximum_speed", pa.float64()),
+        ("mean_acceleration", pa.float64()),
+        ("maximum_acceleration", pa.float64()),
+        ("mean_jerk", pa.float64()),
+        ("maximum_jerk", pa.float64()),
+        ("time_not_moving", pa.float64()),
+        ("mean_distance", pa.float64()),
+        *((f"{zone}_zone_share", pa.float64()) for zone in ZONES),
+        ("space_compliance", pa.float64()),
+        ("minimum_time_to_collision", pa.float64()),
+        ("social_work", pa.float64()),
+        *((f"collisions_{kind.name.lower()}_by_{who.name.lower()}", pa.int64()) for kind in Partner for who in Fault),
+        *((f"collisions_{what.name.lower()}", pa.int64()) for what in Severity),
+        ("repeated_collisions", pa.int64()),
+        ("struck_standing", pa.bool_()),
+        ("largest_closing_speed", pa.float64()),
+        ("largest_peak_force", pa.float64()),
+        ("human_completion_time", pa.float64()),
+        ("human_path_length", pa.float64()),
+        ("human_intimate_intrusions", pa.int64()),
+        ("human_intrusion_share", pa.float64()),
+        ("human_minimum_distance", pa.float64()),
         ("episode", pa.string()),
         ("state_hash", pa.string()),
     ]
 )
 """Columns of the agents' table: metrics as `socialnav_mj.metrics` defines them, null where they are NaN; `episode` is
-the file the row comes from, `first_partner` is "pedestrian", "agent" or null."""
+the file the row comes from, `first_partner` is "pedestrian", "agent" or null, `human_...` are the values of the person
+that the agent replaced (null until paired, or if the run has no human row of that draw)."""
 
 _METADATA = ("controller", "controller_config", "scenario", "scenario_name", "draw", "recording", "state_hash")
 _RECORDING = ("name", "variant", "checksum")
@@ -85,7 +111,11 @@ class Results:
     """All agents of a run, and the episodes they come from, in the same order."""
 
     agents: pa.Table
-    """Columns of `SCHEMA`."""
+    """Columns of `SCHEMA`, paired with the human row."""
+    contacts: pa.Table
+    """Columns of `contact_table.CONTACT_SCHEMA`."""
+    overlaps: dict[tuple[str, str, str], list[float]]
+    """Share of the replayed pedestrians of each episode that overlap another one, by dataset, variant, scenario."""
     sources: tuple[Source, ...]
     """One for each episode, even without agents."""
 
@@ -107,10 +137,11 @@ def agents_table(episode: Episode, *, file: str = "") -> pa.Table:
     dataset, variant, scenario, controller = source.group
     n = episode.n_agents
     metrics = per_agent(episode)
-    values: dict[str, NDArray[Any] | list[str | None]] = dict(metrics)
+    values: dict[str, NDArray[Any] | list[Any]] = dict(metrics)
     names = {int(partner): partner.name.lower() for partner in Partner}
     values["first_partner"] = [names.get(int(partner)) for partner in metrics["first_partner"]]
     values |= {"agent": np.arange(n), "person": episode.agent_person}
+    values |= {name: [None] * n for name in HUMAN_COLUMNS}
     constant = {
         "dataset": dataset,
         "variant": variant,
@@ -152,7 +183,7 @@ def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs:
     read = joblib.Parallel(n_jobs=n_jobs)(joblib.delayed(_read)(path) for path in paths)
     places = {name: place for place, name in enumerate(controllers)}
 
-    def key(item: tuple[Source, pa.Table]) -> tuple[Any, ...]:
+    def key(item: tuple[Source, pa.Table, pa.Table, float]) -> tuple[Any, ...]:
         source = item[0]
         dataset, variant, scenario, controller = source.group
         place = places.get(controller, len(places))
@@ -160,15 +191,31 @@ def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs:
         return dataset, variant, share, scenario, controller == HUMAN, place, controller, source.draw, source.file
 
     read.sort(key=key)
-    sources = tuple(source for source, _ in read)
+    sources = tuple(source for source, *_ in read)
     _check_comparable(sources)
-    return Results(agents=pa.concat_tables([table for _, table in read]), sources=sources)
+    overlaps: dict[tuple[str, str, str], list[float]] = {}
+    for source, _, _, share in read:
+        if source.group[3] == HUMAN and np.isfinite(share):
+            overlaps.setdefault(source.group[:3], []).append(share)
+    return Results(
+        agents=pair_with_humans(pa.concat_tables([agents for _, agents, _, _ in read])),
+        contacts=pa.concat_tables([contacts for _, _, contacts, _ in read]),
+        overlaps=overlaps,
+        sources=sources,
+    )
 
 
-def _read(path: Path) -> tuple[Source, pa.Table]:
+def _read(path: Path) -> tuple[Source, pa.Table, pa.Table, float]:
+    """An episode's description, agents, collisions, and the share of its pedestrians that overlap another one."""
     episode = Episode.load(path)
     try:
-        return Source(file=path.name, metadata=episode.metadata), agents_table(episode, file=path.name)
+        agents = agents_table(episode, file=path.name)
+        source = Source(file=path.name, metadata=episode.metadata)
+        labels = dict(zip(("dataset", "variant", "scenario", "controller"), source.group, strict=True))
+        contacts = contacts_table(episode, labels=labels | {"draw": source.draw}, file=path.name)
+        overlapping = pedestrian_overlaps(episode) > 0 if source.group[3] == HUMAN else np.zeros(0)
+        share = float(overlapping.mean()) if overlapping.size else float("nan")
+        return source, agents, contacts, share
     except (EpisodeError, KeyError, TypeError) as error:
         raise EpisodeError(f"{path} cannot be scored: {error}") from error
 
