@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from socialnav_mj.analysis.touches import partner_person
 from socialnav_mj.episode import Episode, Partner
 from socialnav_mj.metrics.collisions import counted_contacts
 from socialnav_mj.metrics.contacts import (
@@ -13,7 +14,6 @@ from socialnav_mj.metrics.contacts import (
     bearing,
     fault,
     first_touch,
-    partner_person,
     standing,
 )
 from socialnav_mj.metrics.severity import Severity, flesh_force, severity
@@ -69,7 +69,7 @@ def contacts_table(episode: Episode, *, labels: dict[str, Any], file: str = "") 
         "person": episode.agent_person[episode.contact_agent],
         "time": episode.contact_time,
         "partner": _names(Partner, episode.contact_partner_kind),
-        "partner_person": partner_person(episode),
+        "partner_person": partner_person(episode, np.arange(len(episode.contact_time))),
         "first": first_touch(episode),
         "fault": _names(Fault, fault(episode)),
         "agent_standing": standing(episode),

@@ -5,7 +5,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.episode import Episode, IntArray, Partner
+from socialnav_mj.episode import Episode, IntArray
 from socialnav_mj.geometry import Array, wrap_angle
 from socialnav_mj.metrics.kinematics import STANDING_SPEED
 from socialnav_mj.metrics.pairs import pairs, radii
@@ -157,19 +157,3 @@ def _segment_distance(begin: Array, end: Array) -> Array:
     squared = np.einsum("...d,...d->...", way, way)
     share = np.divide(-np.einsum("...d,...d->...", begin, way), squared, out=np.zeros_like(squared), where=squared > 0)
     return np.linalg.norm(begin + np.clip(share, 0.0, 1.0)[..., None] * way, axis=-1)
-
-
-def partner_person(episode: Episode) -> IntArray:
-    """Ids of the people the partners are, or replace.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (k,).
-    """
-    result = np.zeros(len(episode.contact_time), dtype=np.int64)
-    for kind, ids in ((Partner.PEDESTRIAN, episode.pedestrian_person), (Partner.AGENT, episode.agent_person)):
-        here = episode.contact_partner_kind == kind
-        result[here] = ids[episode.contact_partner[here]]
-    return result
