@@ -1,0 +1,372 @@
+"""ReplayIRL as a whole on the smallest crowd: what is stored, learned, saved, resumed and refused."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+from scenes import TINY  # noqa: E402
+from scipy.stats import norm  # noqa: E402
+from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
+
+from socialnav_mj.controllers.replay_irl import load_policy  # noqa: E402
+from socialnav_mj.environment import make_scenario  # noqa: E402
+from socialnav_mj.features import feature_set  # noqa: E402
+from socialnav_mj.learning.config import TrainingConfig  # noqa: E402
+from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv  # noqa: E402
+from socialnav_mj.learning.experts import demonstrate  # noqa: E402
+from socialnav_mj.learning.policy_file import save_policy  # noqa: E402
+from socialnav_mj.learning.replay_irl import ReplayIRL  # noqa: E402
+from socialnav_mj.learning.training import train  # noqa: E402
+from socialnav_mj.recordings import load_recording  # noqa: E402
+
+SMALL = TrainingConfig(
+    datasets=(str(TINY),),
+    train_window=(0.0, 1.0),
+    validation_window=(0.0, 1.0),
+    test_window=(0.0, 1.0),
+    scene_steps=500,
+    shares=(0.4, 1.0),
+    n_slots=3,
+    hidden=(16,),
+    batch_size=32,
+    updates_per_scene_step=1,
+    guided_scene_steps=100,
+    buffer_size=2000,
+    checkpoint_every=200,
+    validation_shares=(0.7,),
+)
+
+
+def small(**changes) -> TrainingConfig:
+    return TrainingConfig(**{**{n: getattr(SMALL, n) for n in SMALL.__dataclass_fields__}, **changes})
+
+
+def model_of(config: TrainingConfig) -> ReplayIRL:
+    """A fresh learner on the smallest crowd."""
+    recording, features = load_recording(config.datasets[0]), feature_set(config.features)
+    env = CrowdVecEnv(
+        [recording],
+        features,
+        shares=config.shares,
+        n_slots=config.n_slots,
+        robot_radius=config.robot_radius,
+        pedestrian_radius=config.pedestrian_radius,
+        guide=config.guide,
+        seed=config.seed,
+    )
+    experts = demonstrate(
+        recording, features, make_scenario(share=1.0), minimum_displacement=2.0, contact_distance=0.25
+    )
+    torch.set_num_threads(1)
+    return ReplayIRL(env, experts, features, config)
+
+
+def learned(config: TrainingConfig, scene_steps: int, callback=None) -> ReplayIRL:
+    model = model_of(config)
+    return model.learn(scene_steps * config.n_slots, callback=callback, log_interval=None)
+
+
+def assert_same(one, other, path=""):
+    """Equal values in nested dictionaries and lists."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys(), path
+        for key in one:
+            assert_same(one[key], other[key], f"{path}/{key}")
+    elif isinstance(one, list | tuple):
+        assert len(one) == len(other), path
+        for i, (a, b) in enumerate(zip(one, other, strict=True)):
+            assert_same(a, b, f"{path}/{i}")
+    elif isinstance(one, torch.Tensor | np.ndarray):
+        assert np.array_equal(np.asarray(one), np.asarray(other)), path
+    else:
+        assert one == other, path
+
+
+# What is stored
+
+
+def test_transitions_follow_each_other_and_end_in_absorbing_states():
+    """Over several scenes: a run's next state is its following transition's state; flags are raised only at the end."""
+    model = learned(small(guided_scene_steps=1000), 400)
+    buffer = model.replay_buffer
+    size = buffer.size()
+    previous = buffer.previous[:size]
+    inner = np.flatnonzero(previous >= 0)
+    assert len(inner) > 0.8 * size
+    np.testing.assert_array_equal(buffer.observations[inner], buffer.next_observations[previous[inner]])
+    assert (buffer.runs[inner] == buffer.runs[previous[inner]]).all()
+    assert not buffer.dones[previous[inner]].any()
+    done, late = buffer.dones[:size, 0] == 1.0, buffer.timeouts[:size, 0] == 1.0
+    flags = buffer.next_observations[:size, 0, -2:].sum(axis=1)
+    np.testing.assert_array_equal(flags, (done & ~late).astype(float))
+    assert done.sum() >= 3 and not (late & ~done).any()
+    assert not buffer.observations[:size, 0, -2:].any()
+    assert (np.abs(buffer.observations[:size, 0]).sum(axis=1) > 0.0).all()  # no empty slot
+
+
+class RecordGuide(BaseCallback):
+    """Keeps the guide's action of every step."""
+
+    def _on_rollout_start(self) -> None:
+        self.guided = self.model.crowd.guide_action()
+
+    def _on_step(self) -> bool:
+        self.seen = [*getattr(self, "seen", []), (self.guided, [i["active"] for i in self.locals["infos"]])]
+        return True
+
+
+def test_log_density_of_the_guides_actions_is_the_noises():
+    """Normal around the guide's own action, wherever the limits did not clip it."""
+    config, callback = small(guided_scene_steps=1000), RecordGuide()
+    buffer = learned(config, 60, callback).replay_buffer
+    guided = np.concatenate([action[active] for action, active in callback.seen])
+    # The callback of a step sees it before it is stored: all but nothing is there, in the same order.
+    size = buffer.size()
+    assert len(guided) == size
+    action = buffer.actions[:size, 0]
+    inside = (np.abs(action) < 1.0).all(axis=1)
+    assert 0.2 < inside.mean() < 1.0
+    expected = norm.logpdf(action, guided, config.guide_noise).sum(axis=1)
+    np.testing.assert_allclose(buffer.log_probs[:size][inside], expected[inside], atol=1e-3)
+
+
+def test_log_density_of_the_actors_actions_is_its_squashed_normals(monkeypatch):
+    """Against the closed form: normal density of atanh(a) over 1 - a^2; the actor stays as it is."""
+    monkeypatch.setattr(ReplayIRL, "train", lambda *args, **kwargs: None)
+    model = learned(small(guided_scene_steps=1), 60)
+    buffer = model.replay_buffer
+    rows = slice(3, buffer.size())  # the guide's step stored at most 3
+    state, action = torch.as_tensor(buffer.observations[rows, 0]), buffer.actions[rows, 0].astype(float)
+    with torch.no_grad():
+        mean, log_std, _ = model.actor.get_action_dist_params(state)
+    inside = (np.abs(action) < 0.99).all(axis=1)
+    assert inside.sum() > 20
+    density = norm.logpdf(np.arctanh(action[inside]), mean.numpy()[inside], np.exp(log_std.numpy()[inside]))
+    expected = (density - np.log1p(-(action[inside] ** 2))).sum(axis=1)
+    np.testing.assert_allclose(buffer.log_probs[rows][inside], expected, atol=2e-3)
+
+
+# What is learned
+
+
+@pytest.mark.parametrize("partition", ["fused", "importance", "segment"])
+def test_reward_steps_prefer_the_experts_states_to_the_buffers(partition):
+    """The experts stand near their goals, the buffer far from them; no step of the environment is needed."""
+    config = small(partition=partition, absorbing_share=0.0, segment_length=3)
+    model = model_of(config)
+    model.set_logger(quiet())
+    size = model.features.size + 2
+    near, far = np.zeros((2, size), dtype=np.float32)
+    near[3], far[2] = 1.0, 1.0
+    model.running = np.tile(near, (20, 1))
+    infos = [{"active": True}] * 3
+    for _ in range(50):
+        states = np.tile(far, (3, 1))
+        model.replay_buffer.store(states, states, np.zeros((3, 2)), np.zeros(3, dtype=bool), infos, np.zeros(3))
+    steps, before = model.num_timesteps, difference(model, near, far)
+    for _ in range(100):
+        model.reward_step()
+    assert difference(model, near, far) > max(before, 0.0) + 0.2
+    assert model.num_timesteps == steps
+    values = model.logger.name_to_value
+    assert 1.0 <= values["reward/effective_sample_size"] <= 2 * config.batch_size
+    assert values["reward/expert"] > values["reward/policy"]
+
+
+def difference(model, one, other):
+    with torch.no_grad():
+        reward = model.reward_net(torch.as_tensor(np.stack([one, other])))
+    return float(reward[0] - reward[1])
+
+
+def quiet():
+    from stable_baselines3.common.logger import Logger
+
+    return Logger(folder=None, output_formats=[])
+
+
+def test_reward_steps_come_every_so_many_updates():
+    config = small(guided_scene_steps=10, updates_per_scene_step=2, updates_per_reward_step=4)
+    calls = []
+    model = model_of(config)
+    model.reward_step = lambda: calls.append(model.updates)
+    model.learn(20 * config.n_slots, log_interval=None)
+    assert model.updates == 20  # 10 steps after the guide's, 2 updates each
+    assert calls == [4, 8, 12, 16, 20]
+
+
+# Saving
+
+
+@pytest.mark.parametrize("features", ["continuous", "risk"])
+def test_saved_policy_acts_as_the_actor(features, tmp_path):
+    """Numpy equals torch within 1e-6, and a policy that was saved and loaded twice acts the same to the bit."""
+    config = small(features=features, hidden=(16, 16))
+    model = model_of(config)
+    policies = []
+    for name in ("a.safetensors", "b.safetensors"):
+        save_policy(model, tmp_path / name, {"config": config.as_dict()})
+        policies.append(load_policy(str(tmp_path / name)))
+    state = np.random.default_rng(0).normal(size=(200, feature_set(features).size + 2))
+    action = policies[0].action(state)
+    np.testing.assert_array_equal(action, policies[1].action(state))
+    expected, _ = model.predict(state.astype(np.float32), deterministic=True)
+    np.testing.assert_allclose(action, expected, atol=1e-6)
+    with torch.no_grad():
+        reward = model.reward_net(torch.as_tensor(state, dtype=torch.float32)).numpy()
+    np.testing.assert_allclose(policies[0].reward_of(state), reward, atol=1e-6)
+    assert policies[0].card["config"]["features"] == features
+
+
+def test_checkpoint_restores_everything(tmp_path):
+    """Weights, optimisers, temperature and counters, through a file that runs no code."""
+    config = small(guided_scene_steps=10)
+    model, other = learned(config, 30), model_of(config)
+    torch.save(model.checkpoint(), tmp_path / "c.pt")
+    other.restore(torch.load(tmp_path / "c.pt", weights_only=True), model.replay_buffer.state())
+    assert model.updates > 0 and other.updates == model.updates
+    assert_same(without_random(other.checkpoint()), without_random(model.checkpoint()))
+    # The same batch afterwards changes both alike.
+    for learner in (model, other):
+        learner.set_logger(quiet())
+        learner.replay_buffer.random = np.random.default_rng(1)
+        learner.random = np.random.default_rng(1)
+        torch.manual_seed(1)
+        learner._current_progress_remaining = 0.5
+        learner.train(8, 32)
+    assert_same(without_random(other.checkpoint()), without_random(model.checkpoint()))
+
+
+def without_random(checkpoint):
+    return {name: value for name, value in checkpoint.items() if name not in ("torch_random", "seconds")}
+
+
+# The whole training
+
+
+class KilledError(Exception):
+    """Stands for a kill."""
+
+
+@pytest.fixture(scope="module")
+def killed_and_resumed(tmp_path_factory):
+    """A training killed at step 330 after the checkpoint of 200, and resumed to its 500 steps.
+
+    Returns:
+        Folder, scene steps reported by the first and by the second process, and the files after the kill.
+    """
+    folder = tmp_path_factory.mktemp("training")
+    first, second = [], []
+
+    def kill(progress):
+        first.append(progress.scene_steps)
+        if progress.scene_steps == 330:
+            raise KilledError
+
+    with pytest.raises(KilledError):
+        train(SMALL, folder, progress=kill)
+    after_kill = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    assert train(SMALL, folder, progress=lambda p: second.append(p.scene_steps)) == folder / "best.safetensors"
+    return folder, first, second, after_kill
+
+
+def test_training_of_500_steps_writes_a_policy_that_acts(killed_and_resumed):
+    folder = killed_and_resumed[0]
+    policy = load_policy(str(folder / "best.safetensors"))
+    assert np.isfinite(policy.action(np.zeros((1, 56)))).all()
+    assert TrainingConfig.from_dict(policy.card["config"]) == SMALL
+    assert policy.card["recordings"][0]["name"] == "tiny" and policy.card["versions"]["torch"] == torch.__version__
+    history = json.loads((folder / "history.json").read_text())
+    assert [entry["scene_steps"] for entry in history] == [200, 400, 500]
+    for entry in history:
+        expected = entry["success"] - SMALL.intrusion_weight * entry["intrusion_share"]
+        assert entry["score"] == pytest.approx(expected) and 0.0 <= entry["success"] <= 1.0
+        assert {"sac", "reward", "all", "validation"} <= entry["seconds"].keys()
+    assert policy.card["score"] == max(entry["score"] for entry in history)
+    assert any((folder / "tensorboard").iterdir())
+    assert not list(folder.glob("*.part*"))
+
+
+def test_kill_loses_at_most_one_checkpoint(killed_and_resumed):
+    """130 steps are lost, the 200 before are not."""
+    _, first, second, _ = killed_and_resumed
+    assert first == list(range(1, 331)) and second == list(range(201, 501))
+
+
+def test_what_a_kill_leaves_is_the_checkpoint_as_it_was(killed_and_resumed, tmp_path):
+    """A learner built anew from the files has the counters of step 200 and the weights of the policy saved then."""
+    _, _, _, after_kill = killed_and_resumed
+    for name, content in after_kill.items():
+        (tmp_path / name).write_bytes(content)
+    model = model_of(SMALL)
+    state = torch.load(tmp_path / "checkpoint.pt", weights_only=True)
+    with np.load(tmp_path / "buffer.npz", allow_pickle=False) as buffer:
+        model.restore(state, dict(buffer))
+    assert model.num_timesteps == 200 * SMALL.n_slots and model.updates == state["updates"]
+    assert 0 < model.updates <= 100
+    assert model.replay_buffer.size() > 100
+    saved = load_policy(str(tmp_path / "latest.safetensors"))
+    state = np.random.default_rng(0).normal(size=(20, 56)).astype(np.float32)
+    np.testing.assert_allclose(saved.action(state), model.predict(state, deterministic=True)[0], atol=1e-6)
+
+
+def test_finished_training_does_nothing_more(killed_and_resumed):
+    folder = killed_and_resumed[0]
+    before = (folder / "checkpoint.pt").read_bytes()
+    steps = []
+    assert train(SMALL, folder, progress=steps.append) == folder / "best.safetensors"
+    assert steps == [] and (folder / "checkpoint.pt").read_bytes() == before
+
+
+def test_another_configuration_in_the_same_folder_is_refused(killed_and_resumed):
+    folder = killed_and_resumed[0]
+    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    with pytest.raises(ValueError, match=r"config\.json: the training there has gamma = 0\.95, but 0\.9 is asked for"):
+        train(small(gamma=0.9), folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
+
+
+def test_training_is_repeatable(tmp_path):
+    """The same configuration twice: the same weights to the bit."""
+    config = small(guided_scene_steps=20)
+    one, other = learned(config, 60), learned(config, 60)
+    assert one.updates == 40
+    assert_same(without_random(one.checkpoint()), without_random(other.checkpoint()))
+    assert_same(one.replay_buffer.state(), other.replay_buffer.state())
+    different = learned(small(guided_scene_steps=20, seed=1), 60)
+    assert not np.array_equal(different.checkpoint()["reward_net"]["layers.0.weight"], one.reward_net.layers[0].weight)
+
+
+# Configuration
+
+
+def test_configuration_goes_through_json():
+    config = small(partition="segment", hidden=(3, 4))
+    assert TrainingConfig.from_dict(json.loads(json.dumps(config.as_dict()))) == config
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"partition": "exact"}, "partition = 'exact' is not allowed; allowed: fused, importance, segment"),
+        ({"scene_steps": 0}, "scene_steps = 0 is not allowed"),
+        ({"n_slots": -1}, "n_slots = -1 is not allowed"),
+        ({"datasets": ()}, "datasets and shares must not be empty"),
+    ],
+)
+def test_configuration_refuses_what_cannot_be(changes, message):
+    with pytest.raises(ValueError) as caught:
+        small(**changes)
+    assert message in str(caught.value)
+
+
+def test_learning_rate_falls_to_a_tenth():
+    """Of SAC and reward alike, over the whole training."""
+    model = model_of(SMALL)
+    assert [model.lr_schedule(left) for left in (1.0, 0.5, 0.0)] == pytest.approx([1e-3, 5.5e-4, 1e-4])
+    assert math.isclose(model.target_entropy, SMALL.target_entropy)
