@@ -1,0 +1,165 @@
+"""README.md of an experiment: the verdicts, the main table, the figures, and where it all comes from."""
+
+import json
+from collections.abc import Mapping, Sequence
+from math import isnan
+from typing import Any
+
+from socialnav_mj.analysis.claims import Finding
+from socialnav_mj.analysis.figures import FIGURES
+from socialnav_mj.analysis.levels import Level, LevelTable
+from socialnav_mj.analysis.panel import COMMON, METHODS, MIXED
+from socialnav_mj.analysis.style import LOOKS, SCENARIO_TITLES
+
+_COLUMNS = (
+    ("success", "success", 3),
+    ("hit first by a pedestrian / agent", "first_hit_pedestrian", 3),
+    ("timed out", "timed_out", 3),
+    ("steps within 1.2 m", "intimate_intrusions", 1),
+    ("share of steps within 1.2 m", "intrusion_share_of_steps", 3),
+    ("speed [m/s]", "average_speed", 3),
+    ("time, same agents [s]", f"completion_time_success{COMMON}", 2),
+    ("time, own successes [s]", "completion_time_success", 2),
+    ("time, all, censored [s]", "time_under_way", 2),
+    ("path ratio, same agents", f"distance_to_displacement_success{COMMON}", 3),
+    ("path ratio, own successes", "distance_to_displacement_success", 3),
+)
+_HOW_TO_READ = """\
+Means over draws (a draw is one random choice of the people who are replaced) and training seeds. Brackets, and the \
+bars of the figures: 95 % interval for other draws and other trainings, see claims.md. White dots: each training \
+alone. *Same agents*: those that every controller brought home without a collision. *Censored*: everybody who spawned; \
+who did not arrive counts with the time watched, a lower bound. *Recorded humans*: each replaced person on its own \
+track, scored by the same code; contacts by geometry. All numbers with their intervals: tables/levels.csv.
+"""
+_HELD_OUT = """\
+Agents by when the person they replace appears: in the part of the recording that the policies were trained on, or \
+after the parts for training and validation (held out). The crowd differs between the two, so the rows that learned \
+nothing show what the crowd alone changes.
+"""
+_REWARD = """\
+Learned reward of an agent that drives at 0.8 m/s towards a goal 5 m ahead, with one walker (1 m/s) at each place \
+around it. The white line, and the mark on the scale, is the reward with nobody there; the dashed circle is 1.2 m.
+"""
+
+
+def experiment_page(
+    table: LevelTable,
+    findings: Sequence[Finding],
+    *,
+    held_out: Mapping[str, Sequence[Level]],
+    sweep: Mapping[float, LevelTable],
+    provenance: Mapping[str, Any],
+) -> str:
+    """The page.
+
+    Args:
+        table: Levels of the default setting.
+        findings: The same setting's.
+        held_out: Period: its levels.
+        sweep: Switch distance [m]: levels.
+        provenance: Command, experiment, recording, policies, runs.
+
+    Returns:
+        Markdown.
+    """
+    recording = provenance["recording"]
+    lines = [f"# The paper's experiment on {recording['name']} ({recording['variant']})", ""]
+    lines += [f"Command: `{provenance['command']}`", "", "## Claims of the paper, default setting", ""]
+    lines += [_row(["claim", "the paper says", "verdict"]), _row(["---"] * 3)]
+    lines += [_row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**"]) for f in findings]
+    lines += ["", "Effects, intervals, variants and the rule: [claims.md](claims.md).", "", "## Results", ""]
+    lines += [_HOW_TO_READ, *_results(table)]
+    for drawing in FIGURES:
+        lines += [f"![{drawing.name}](figures/{drawing.name}.png)", ""]
+    lines += ["## Each training", "", *_trainings(table)]
+    lines += ["## In-sample and held out", "", _HELD_OUT, *_periods(held_out)]
+    if len(sweep) > 1:
+        lines += ["## Switch distance", "", *_swept(sweep), "![sweep](figures/figure_6_switch_distance.png)", ""]
+    lines += ["## What the reward learned", "", _REWARD, "![reward](figures/figure_7_learned_reward.png)", ""]
+    return "\n".join([*lines, *_traceability(provenance)]) + "\n"
+
+
+def _results(table: LevelTable) -> list[str]:
+    lines = [_row(["scenario", "controller", "success", *(h for h, _, _ in _COLUMNS[1:])])]
+    lines += [_row(["---"] * (len(_COLUMNS) + 2))]
+    for scenario in table.scenarios:
+        for method in METHODS:
+            found = [(table.find(scenario, method, measure), digits) for _, measure, digits in _COLUMNS]
+            if found[0][0] is None:
+                continue
+            cells = [_mean(level, digits) for level, digits in found]
+            cells[0] = _with_interval(found[0][0])
+            cells[1] += f" / {_mean(table.find(scenario, method, 'first_hit_agent'), 3)}"
+            lines.append(_row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells]))
+    return [*lines, ""]
+
+
+def _trainings(table: LevelTable) -> list[str]:
+    titles = [SCENARIO_TITLES.get(s, s) for s in table.scenarios]
+    lines = ["Success / share of steps within 1.2 m.", "", _row(["controller", "training", *titles])]
+    lines += [_row(["---"] * (len(titles) + 2))]
+    for method in METHODS:
+        for training in table.trainings(method):
+            cells = [
+                f"{_mean(table.find(s, method, 'success', training), 3)} / "
+                f"{_mean(table.find(s, method, 'intrusion_share_of_steps', training), 3)}"
+                for s in table.scenarios
+            ]
+            lines.append(_row([LOOKS[method].label, str(training), *cells]))
+    return [*lines, ""]
+
+
+def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
+    tables = {name: LevelTable(rows=tuple(rows)) for name, rows in held_out.items()}
+    heads = [f"{what}, {name}" for what in ("success", "share of steps within 1.2 m") for name in tables]
+    lines = [_row(["scenario", "controller", *heads, "agents"]), _row(["---"] * (len(heads) + 3))]
+    for scenario in dict.fromkeys(s for table in tables.values() for s in table.scenarios):
+        for method in METHODS:
+            success = [table.find(scenario, method, "success") for table in tables.values()]
+            shares = [table.find(scenario, method, "intrusion_share_of_steps") for table in tables.values()]
+            if all(level is None for level in success):
+                continue
+            counts = " / ".join("0" if level is None else str(level.n_values) for level in success)
+            cells = [_with_interval(level) for level in (*success, *shares)]
+            lines.append(_row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells, counts]))
+    return [*lines, ""]
+
+
+def _swept(sweep: Mapping[float, LevelTable]) -> list[str]:
+    scenarios = next(iter(sweep.values())).scenarios
+    lines = ["Mixed policy: success / share of steps within 1.2 m / time under way [s].", ""]
+    lines += [_row(["distance [m]", *(SCENARIO_TITLES.get(s, s) for s in scenarios)])]
+    lines += [_row(["---"] * (len(scenarios) + 1))]
+    measures = (("success", 3), ("intrusion_share_of_steps", 3), ("time_under_way", 1))
+    for distance, table in sweep.items():
+        cells = [" / ".join(_mean(table.find(s, MIXED, m), digits) for m, digits in measures) for s in scenarios]
+        lines.append(_row([f"{distance:g}", *cells]))
+    return [*lines, ""]
+
+
+def _traceability(provenance: Mapping[str, Any]) -> list[str]:
+    recording = provenance["recording"]
+    lines = ["## Traceability", "", f"- experiment: `{json.dumps(provenance['experiment'], sort_keys=True)}`"]
+    lines += [f"- recording: {recording['name']}, variant {recording['variant']}, checksum {recording['checksum']}"]
+    for policy, facts in provenance["policies"].items():
+        lines += [f"- policy {policy}: training seed {facts['training_seed']}, sha256 {facts['sha256']}"]
+    for name, run in provenance["runs"].items():
+        count = f"{run['episodes']} episodes, {run['agents']} agents"
+        lines += [f"- run {name}: {count}, sha256 of its state hashes {run['sha256_of_state_hashes']}"]
+    versions = {json.dumps(v, sort_keys=True) for run in provenance["runs"].values() for v in run["versions"]}
+    lines += [f"- versions: {', '.join(f'{k} {v}' for k, v in json.loads(text).items())}" for text in sorted(versions)]
+    return [*lines, "- everything, with the policies' cards: provenance.json"]
+
+
+def _mean(level: Level | None, digits: int) -> str:
+    return "-" if level is None or isnan(level.interval.mean) else f"{level.interval.mean:.{digits}f}"
+
+
+def _with_interval(level: Level | None) -> str:
+    if level is None or isnan(level.interval.low):
+        return _mean(level, 3)
+    return f"{_mean(level, 3)} ({level.interval.low:.3f} to {level.interval.high:.3f})"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -1,0 +1,139 @@
+"""One look for all figures: told apart by colour, by hatch or marker, and in greyscale."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from socialnav_mj.analysis.paired import HUMAN
+from socialnav_mj.analysis.panel import MIXED, POTENTIAL_FIELD, REPLAY_IRL
+from socialnav_mj.files import written_whole
+
+WIDTH = 7.2
+"""Of every figure: a text width of two columns [inch]."""
+DOTS_PER_INCH = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """How a method is drawn."""
+
+    label: str
+    colour: str
+    hatch: str
+    marker: str
+    line: Literal["-", "--", "-.", ":"]
+
+
+# P. Tol's "high-contrast" scheme: distinct for every kind of colour vision, and light, middle, dark in greyscale.
+LOOKS: dict[str, Look] = {
+    POTENTIAL_FIELD: Look(label="potential field", colour="#DDAA33", hatch="", marker="o", line="-"),
+    REPLAY_IRL: Look(label="ReplayIRL", colour="#004488", hatch="////", marker="s", line="--"),
+    MIXED: Look(label="mixed", colour="#BB5566", hatch="....", marker="D", line="-."),
+    HUMAN: Look(label="recorded humans", colour="#000000", hatch="", marker="*", line=":"),
+}
+SHADES = ("#000000", "#004488", "#BB5566", "#DDAA33")
+"""Dark to light, for whatever is no method; with MARKERS and LINES beside them."""
+MARKERS = ("o", "s", "D", "^")
+LINES = ("-", "--", "-.", ":")
+
+SCENARIO_TITLES = {
+    "scenario_1": "scenario 1: 10 %",
+    "scenario_2": "scenario 2: 30 %",
+    "scenario_3": "scenario 3: 70 %",
+    "scenario_4": "scenario 4: 90 %",
+}
+"""Task: number and share of people who are replaced."""
+
+_SETTINGS: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib, so that every machine sets the same text
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 4.5,
+    "errorbar.capsize": 2.5,
+    "hatch.linewidth": 0.7,
+    "svg.fonttype": "none",  # text stays text: it can be searched and read aloud
+    "svg.hashsalt": "socialnav_mj",
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Settings of all figures, for as long as the block lasts."""
+    with mpl.rc_context(_SETTINGS):
+        yield
+
+
+def new_figure(height: float) -> Figure:
+    """An empty figure that belongs to no window system; to be made and drawn inside `style`.
+
+    Args:
+        height: [inch].
+
+    Returns:
+        A figure of the common width.
+    """
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write a figure as PNG and SVG, each whole; equal figures give equal bytes.
+
+    Args:
+        figure: To be written.
+        folder: Where to.
+        name: Without ending.
+
+    Returns:
+        Paths of the two files.
+    """
+    paths = []
+    for ending, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
+        path = folder / f"{name}.{ending}"
+        with written_whole(path) as part:
+            figure.savefig(part, dpi=DOTS_PER_INCH, metadata=metadata)
+        paths.append(path)
+    return paths
+
+
+def short_title(scenario: str, place: int) -> str:
+    """Title of a sub-figure.
+
+    Args:
+        scenario: Name of a task.
+        place: Of the sub-figure, from 0.
+
+    Returns:
+        As "(a) scenario 1: 10 %".
+    """
+    return f"({'abcdefgh'[place]}) {SCENARIO_TITLES.get(scenario, scenario)}"
+
+
+def methods_of(found: Sequence[str]) -> list[str]:
+    """Methods in the order of every legend.
+
+    Args:
+        found: Those that there are.
+
+    Returns:
+        The same, sorted.
+    """
+    return [method for method in LOOKS if method in found]
