@@ -27,7 +27,9 @@ from rich.text import Text
 from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
 
 if TYPE_CHECKING:
-    from socialnav_mj.evaluation import Pace
+    from collections.abc import Iterator
+
+    from socialnav_mj.evaluation import Done, Job, Pace
 
 _console = Console()
 _errors = Console(stderr=True)
@@ -54,6 +56,27 @@ class _PaceColumn(ProgressColumn):
         if rate is None or left is None:
             return Text("")
         return Text(f"{rate:.0f} x real time, {timedelta(seconds=round(left))} left", style="progress.remaining")
+
+
+def _follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
+    """Run episodes behind a bar with their rate and the time left; tell at once what went wrong."""
+    from socialnav_mj.evaluation import Pace
+
+    pace = Pace(jobs)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=20),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        _PaceColumn(pace),
+    )
+    with Progress(*columns, console=_errors) as progress:
+        bar = progress.add_task("episodes", total=len(jobs))
+        for done in episodes:
+            pace.note(done)
+            progress.update(bar, advance=1)
+            if done.error is not None:
+                _print(f"{done.job.file_name}: {done.error}", progress.console, style="red")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +118,7 @@ class Evaluate:
     def run(self) -> None:
         """Evaluate, then report."""
         from socialnav_mj.analysis.report import write_report
-        from socialnav_mj.evaluation import Evaluation, Pace, evaluate, jobs_of
+        from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
 
         names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
         evaluation = Evaluation(
@@ -110,22 +133,7 @@ class Evaluate:
         )
         out = self.out or Path("runs") / Path(self.dataset).resolve().stem
         episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)
-        jobs = jobs_of(evaluation)
-        pace = Pace(jobs)
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=20),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            _PaceColumn(pace),
-        )
-        with Progress(*columns, console=_errors) as progress:
-            bar = progress.add_task("episodes", total=len(jobs))
-            for done in episodes:
-                pace.note(done)
-                progress.update(bar, advance=1)
-                if done.error is not None:
-                    _print(f"{done.job.file_name}: {done.error}", progress.console, style="red")
+        _follow(episodes, jobs_of(evaluation))
         with _errors.status("tables and traces"):
             report = write_report(out, console=_console, n_jobs=self.jobs)
         _print(f"report: {report}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)")
@@ -146,6 +154,45 @@ class Report:
 
         path = write_report(self.folder, console=_console, n_jobs=self.jobs)
         _print(f"report: {path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verify:
+    """Run stored episodes again and compare the hashes of their states; exit code 1 if one differs."""
+
+    path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
+    """Folder of `evaluate`, an episode (.npz), or a trace (.rrd)."""
+    dataset: Name = None
+    """Name or path of the recording; by default the name that each file gives."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+
+    def run(self) -> None:
+        """Verify."""
+        from socialnav_mj.verification import files_of, verify
+
+        total, wrong = len(files_of(self.path)), 0
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=_errors) as progress:
+            bar = progress.add_task("files", total=total)
+            data_dir = None if self.data_dir is None else str(self.data_dir)
+            for verdict in verify(self.path, dataset=self.dataset, data_dir=data_dir, n_jobs=self.jobs):
+                progress.advance(bar)
+                wrong += not verdict.same
+                if verdict.error is not None:
+                    result = verdict.error
+                elif verdict.same:
+                    result = f"same {verdict.hash[:16]}"
+                else:
+                    result = f"DIFFERS: stored {verdict.stored_hash[:16]}, now {verdict.hash[:16]}"
+                    if verdict.other_versions:
+                        result += f" (then and now: {'; '.join(verdict.other_versions)})"
+                _print(f"{verdict.path.name}: {result}")
+        _print(f"{total - wrong} of {total} files give the same states again")
+        if wrong:
+            sys.exit(1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -385,13 +432,69 @@ class Train:
         _print(f"policy: {best}\nuse it: --controllers \"replay_irl(policy='{best}')\"")
 
 
+@dataclass(frozen=True, kw_only=True)
+class Reproduce:
+    """Run the paper's experiment: potential field, ReplayIRL of each training, both mixed, and the recorded humans.
+
+    Writes figures, tables and claims.md, with a verdict on every sentence of the paper's results. Run again after an
+    interruption, the same command goes on where it was.
+    """
+
+    dataset: str = "students003"
+    """Name in the catalogue, or path of a recording."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    policies: tuple[str, ...] = ()
+    """Names of shipped policies, or paths of .safetensors files; those trained on the recording by default."""
+    features: Literal["continuous", "risk"] = "continuous"
+    """Feature set of the shipped policies to take."""
+    scenarios: Scenarios = (1, 2, 3, 4)
+    """Scenarios to run; most claims are about all four."""
+    draws: int = 10
+    """Random choices of the replaced people."""
+    seed: int = 0
+    """Seed of the first draw."""
+    variants: bool = False
+    """Run the variants of the setting and the sweep of the switch distance as well."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path = Path("reproduction")
+    """Folder of the results."""
+    publish: Folder = None
+    """Folder that gets a copy of figures, tables and pages: all that holds no recording and no episode."""
+
+    def run(self) -> None:
+        """Run, then draw and write."""
+        from socialnav_mj.reproduction.outputs import publish, write_outputs
+        from socialnav_mj.reproduction.plan import Experiment, reproduce, shipped_for
+
+        experiment = Experiment(
+            dataset=self.dataset,
+            policies=self.policies or shipped_for(self.dataset, self.features),
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            draws=self.draws,
+            seed=self.seed,
+            variants=self.variants,
+        )
+        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
+        _follow(reproduce(experiment, self.out, command=command, n_jobs=self.jobs), experiment.jobs())
+        with _errors.status("tables and figures"):
+            page = write_outputs(experiment, self.out, command=command, n_jobs=self.jobs)
+        _print(f"report: {page}\nclaims: {self.out / 'claims.md'}")
+        if self.publish is not None:
+            _print(f"to be committed: {publish(self.out, self.publish)}")
+
+
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Verify, tyro.conf.subcommand("verify")]
     | Annotated[List, tyro.conf.subcommand("list")]
     | Annotated[Data, tyro.conf.subcommand("data")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
 )
 
 

@@ -25,6 +25,7 @@ ROWS = (
     {"metrics"},
     {"analysis"},
     {"learning"},
+    {"reproduction"},
     {"benchmark", "cli"},
 )
 # Controllers own no simulator: most rows above are closed to them.

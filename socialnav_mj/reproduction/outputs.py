@@ -1,0 +1,208 @@
+"""Episodes of the experiment -> tables, figures, claims.md and README.md; all made again at every call."""
+
+import csv
+import hashlib
+import io
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute
+
+from socialnav_mj.analysis.claims import Finding, examine
+from socialnav_mj.analysis.claims_page import claims_page
+from socialnav_mj.analysis.experiment_page import experiment_page
+from socialnav_mj.analysis.figures import draw_figures, draw_sweep
+from socialnav_mj.analysis.held_out import held_out_levels, period_of_people
+from socialnav_mj.analysis.levels import Level, LevelTable, levels
+from socialnav_mj.analysis.paired import HUMAN
+from socialnav_mj.analysis.panel import MIXED, make_panel
+from socialnav_mj.analysis.reward_map import draw_reward_maps
+from socialnav_mj.analysis.tables import Results, read_results
+from socialnav_mj.controllers.replay_irl import load_policy
+from socialnav_mj.files import write_whole
+from socialnav_mj.recordings import load_recording
+from socialnav_mj.reproduction.plan import (
+    DEFAULT,
+    SWEEP,
+    SWEEP_RUN,
+    SWITCH_DISTANCE,
+    Experiment,
+    Variant,
+    policy_checksum,
+    run_folder,
+)
+from socialnav_mj.rollout import recording_metadata
+
+PUBLIC = ("README.md", "claims.md", "provenance.json", "tables", "figures")
+"""What may travel with the project: no recordings, no episodes."""
+
+
+def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: int = -1) -> Path:
+    """Make everything in the experiment's folder again, except its episodes.
+
+    Args:
+        experiment: That was run by `plan.reproduce`.
+        out: Its folder; gets tables/, figures/, claims.md, README.md and provenance.json.
+        command: That made it.
+        n_jobs: Processes that score episodes.
+
+    Returns:
+        Path of README.md.
+
+    Raises:
+        FileNotFoundError: If a run has no episodes.
+        EpisodeError: If an episode is damaged or does not fit the others.
+        ValueError: If the policies were trained on different parts of the recording.
+    """
+    results = {run.name: read_results(run_folder(out, run.name), n_jobs=n_jobs) for run in experiment.runs()}
+    tables: dict[str, LevelTable] = {}
+    findings: dict[str, list[Finding]] = {}
+    for variant in experiment.settings:
+        panel = make_panel(agents_of(experiment, variant, results), experiment.roster(variant))
+        tables[variant.name] = LevelTable(rows=tuple(levels(panel)))
+        findings[variant.name] = examine(panel)
+    sweep = _sweep(experiment, results, tables[DEFAULT.name])
+    recording = load_recording(experiment.dataset, data_dir=experiment.data_dir)
+    cards = {seed: load_policy(policy).card for seed, policy in experiment.trainings.items()}
+    periods = period_of_people(recording, [card["config"] for card in cards.values()])
+    held_out = held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods)
+
+    _write_csv(out / "tables" / "levels.csv", [r for name, t in tables.items() for r in _rows(t.rows, variant=name)])
+    _write_csv(out / "tables" / "claims.csv", [row for name, f in findings.items() for row in _claim_rows(name, f)])
+    _write_csv(out / "tables" / "held_out.csv", [r for name, t in held_out.items() for r in _rows(t, period=name)])
+    swept = [r for d, t in sweep.items() for r in _rows([x for x in t.rows if x.method == MIXED], switch_distance=d)]
+    _write_csv(out / "tables" / "switch_distance.csv", swept)
+    draw_figures(tables[DEFAULT.name], out / "figures")
+    if len(sweep) > 1:
+        draw_sweep(sweep, tables[DEFAULT.name], out / "figures")
+    draw_reward_maps({f"training {k}": load_policy(p) for k, p in experiment.trainings.items()}, out / "figures")
+    titles = {variant.name: variant.title for variant in experiment.settings}
+    write_whole(out / "claims.md", claims_page(findings, titles=titles, command=command).encode())
+    provenance = {
+        "command": command,
+        "experiment": {k: v for k, v in asdict(experiment).items() if k != "data_dir"},
+        "recording": recording_metadata(recording),
+        "policies": {
+            policy: {"training_seed": seed, "sha256": policy_checksum(policy), "card": cards[seed]}
+            for seed, policy in experiment.trainings.items()
+        },
+        "runs": {name: _provenance(result) for name, result in results.items()},
+    }
+    write_whole(out / "provenance.json", (json.dumps(provenance, indent=1, sort_keys=True) + "\n").encode())
+    page = experiment_page(
+        tables[DEFAULT.name], findings[DEFAULT.name], held_out=held_out, sweep=sweep, provenance=provenance
+    )
+    return write_whole(out / "README.md", page.encode())
+
+
+def agents_of(experiment: Experiment, variant: Variant, results: Mapping[str, Results]) -> pa.Table:
+    """Agents of a setting: its own episodes, and those of the default setting for methods that it does not change.
+
+    Args:
+        experiment: The experiment.
+        variant: The setting.
+        results: Of each run.
+
+    Returns:
+        Columns of `tables.SCHEMA`.
+    """
+    own = results[variant.name].agents
+    others = [e.controller for e in experiment.roster(variant) if e.method not in (*variant.runs, HUMAN)]
+    default = results[DEFAULT.name].agents
+    return pa.concat_tables(
+        [own, default.filter(pa.compute.is_in(default["controller"], pa.array(others, pa.string())))]
+    )
+
+
+def publish(out: Path, folder: Path) -> Path:
+    """Copy what may travel with the project.
+
+    Args:
+        out: Folder of an experiment.
+        folder: Where to; what is there of the same names is replaced.
+
+    Returns:
+        The folder.
+
+    Raises:
+        FileNotFoundError: If the experiment has no such outputs yet.
+    """
+    for name in PUBLIC:
+        source, target = out / name, folder / name
+        if source.is_dir():
+            shutil.rmtree(target, ignore_errors=True)
+            shutil.copytree(source, target)
+        else:
+            write_whole(target, source.read_bytes())
+    return folder
+
+
+def _sweep(experiment: Experiment, results: Mapping[str, Results], default: LevelTable) -> dict[float, LevelTable]:
+    """Levels of the mixed policy by switch distance [m]."""
+    found = {SWITCH_DISTANCE: default}
+    if SWEEP_RUN in results:
+        for distance in SWEEP:
+            panel = make_panel(results[SWEEP_RUN].agents, experiment.sweep_roster(distance))
+            found[distance] = LevelTable(rows=tuple(levels(panel)))
+    return dict(sorted(found.items()))
+
+
+def _provenance(results: Results) -> dict[str, Any]:
+    hashes = sorted(f"{source.file} {source.metadata['state_hash']}" for source in results.sources)
+    versions = {json.dumps(source.metadata.get("versions", {}), sort_keys=True) for source in results.sources}
+    return {
+        "episodes": len(hashes),
+        "agents": results.agents.num_rows,
+        "sha256_of_state_hashes": hashlib.sha256("\n".join(hashes).encode()).hexdigest(),
+        "versions": [json.loads(version) for version in sorted(versions)],
+    }
+
+
+def _rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
+    return [
+        {
+            **labels,
+            "scenario": level.scenario,
+            "method": level.method,
+            "training": "all" if level.training is None else level.training,
+            "measure": level.measure,
+            **asdict(level.interval),
+            "n_values": level.n_values,
+        }
+        for level in found
+    ]
+
+
+def _claim_rows(variant: str, findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    return [
+        {
+            "variant": variant,
+            "claim": finding.claim.key,
+            "claim_verdict": finding.verdict,
+            "claim_verdict_given_trainings": finding.verdict_given,
+            "comparison": part.label,
+            "unit": finding.claim.unit,
+            **asdict(interval),
+            "verdict": verdict,
+        }
+        for finding in findings
+        for part, interval, verdict in finding.parts
+    ]
+
+
+def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({k: _text(v) if isinstance(v, float) else v for k, v in row.items()})
+    write_whole(path, text.getvalue().encode())
+
+
+def _text(value: float) -> str:
+    return "" if value != value else f"{value:.6g}"
