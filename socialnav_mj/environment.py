@@ -121,6 +121,31 @@ def make_environment(
     recording = (
         dataset if isinstance(dataset, Recording) else load_recording(dataset, variant=variant, data_dir=data_dir)
     )
+    return build_environment(
+        recording, scenario, time_limit=time_limit, random=random, environment_kwargs=environment_kwargs
+    )
+
+
+def build_environment(
+    recording: Recording,
+    scenario: Scenario,
+    *,
+    time_limit: float = float("inf"),
+    random: int | np.random.RandomState | None = None,
+    environment_kwargs: dict[str, Any] | None = None,
+) -> Environment:
+    """A resolved scenario as a dm_control environment.
+
+    Args:
+        recording: The crowd.
+        scenario: The resolved scenario.
+        time_limit: The episode is cut after this time [s].
+        random: As in dm_control.
+        environment_kwargs: Passed to `dm_control.rl.control.Environment`.
+
+    Returns:
+        An environment whose task is a `CrowdTask` and whose physics is a `Physics`.
+    """
     task = CrowdTask(recording, scenario, random=random)
     everywhere = np.concatenate(recording.positions)
     model = build_model(

@@ -93,6 +93,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
             controller=HUMAN,
             controller_config={},
             scenario_name=scenario_name,
+            steps=steps - 1,
             state_hash=digest,
         ),
     )

@@ -69,6 +69,7 @@ def rollout(
             controller=controller.name,
             controller_config=controller_config(controller),
             scenario_name=scenario_name,
+            steps=task.step,
             state_hash=digest.hexdigest(),
         ),
     )
@@ -271,7 +272,7 @@ def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> d
     Args:
         recording: The crowd.
         scenario: The resolved scenario.
-        **rest: Further JSON values: controller, controller_config, scenario_name, state_hash.
+        **rest: Further JSON values: controller, controller_config, scenario_name, steps, state_hash.
 
     Returns:
         The value of `Episode.metadata`.

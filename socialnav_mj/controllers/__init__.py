@@ -10,12 +10,16 @@ from typing import Any
 
 from socialnav_mj.controllers.base import Controller, Limits, Observation, TwistController
 from socialnav_mj.controllers.go_straight import GoStraight
+from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.potential_field import PotentialField
+from socialnav_mj.controllers.replay_irl import ReplayIRL
 
 ENTRY_POINT_GROUP = "socialnav_mj.controllers"
 
 BUILT_IN: dict[str, Callable[..., Controller]] = {
     "potential_field": PotentialField,
+    "replay_irl": ReplayIRL,
+    "hybrid": Hybrid,
     "go_straight": GoStraight,
 }
 
@@ -82,6 +86,26 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     return result
 
 
+def controller_of(config: dict[str, Any]) -> Controller:
+    """Inverse of `controller_config`.
+
+    Args:
+        config: As it travels in an episode.
+
+    Returns:
+        A new controller of the same class and configuration.
+
+    Raises:
+        ValueError: If the class cannot be imported or does not take the configuration.
+    """
+    values = dict(config)
+    name = str(values.pop("class", ""))
+    try:
+        return _load(name, name)(**values)
+    except TypeError as error:
+        raise ValueError(f"controller {name!r} cannot be made with {values}: {error}") from error
+
+
 def _parse(spec: str) -> tuple[str, dict[str, Any]]:
     name, bracket, rest = spec.partition("(")
     if not bracket:
@@ -130,5 +154,6 @@ __all__ = [
     "TwistController",
     "available",
     "controller_config",
+    "controller_of",
     "make_controller",
 ]

@@ -27,7 +27,7 @@ class TrainingConfig:
     """Control steps of the training scene; every agent under way gives a transition at each."""
     shares: tuple[float, ...] = (0.3, 0.5, 0.7)
     """Shares of replaced people; the scenes take turns."""
-    n_slots: int = 64
+    n_slots: int = 96
     """Environments of the vector environment, at most as many agents at once; draws that need more are passed over."""
     robot_radius: float = 0.22
     """Of the robots in the training scene, larger than in the evaluation, so that the policy keeps a margin [m]."""
