@@ -116,7 +116,7 @@ class Continuous:
     | 6 + k | proximity exp(-distance / 2 m) of the nearest person in sector k, 0 if there is none | [0, 1] |
     | 18 + k | its closing speed / 2 m/s, clipped | [-1, 1] |
     | 30 + k | its tangential speed to the left / 2 m/s, clipped | [-1, 1] |
-    | 42 + k | greatest risk in the sector, exp(-t / 2 s) exp(-miss distance / 0.5 m), of those who approach | [0, 1] |
+    | 42 + k | greatest risk in the sector, exp(-t / 2 s) exp(-miss distance / 0.5 m), encounters within 4 s | [0, 1] |
     """
 
     name = "continuous"
@@ -191,8 +191,8 @@ then of 8 sectors in the ring from 0.8 to 1.3 m |
     | 66-73 | somebody nearer than 0.5 m in one of 8 sectors |
     | 74-79 | speed below 0.1, 0.3, 0.5, 0.7, 0.9 m/s, or above |
 
-    The risk of a person is high if it approaches and its true miss distance within the next 4 s is below 0.4 m, medium
-    if that is below 0.8 m, else low; a cell takes the greatest of its people.
+    The risk of a person is high if it approaches, is nearest within the next 4 s, and its true miss distance then is
+    below 0.4 m, medium if that is below 0.8 m, else low; a cell takes the greatest of its people.
     """
 
     name = "risk"

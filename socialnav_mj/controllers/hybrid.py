@@ -49,7 +49,7 @@ class Hybrid(TwistController):
     who: Who = "pedestrians"
     """Whose distance counts: replayed pedestrians, or "anyone"."""
     hysteresis: float = 0.0
-    """Once `near` acts, it does so until everybody is farther than switch_distance + hysteresis [m]."""
+    """Once `near` acts, it does so until everybody is at switch_distance + hysteresis or beyond [m]."""
     name: str = "hybrid"
     _controllers: tuple[TwistController, TwistController] = field(init=False, repr=False)
     _acting: NDArray[np.int64] = field(init=False, repr=False)
