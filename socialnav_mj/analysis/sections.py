@@ -41,9 +41,9 @@ counted with the time they were watched; time and path *of arrivals* leave the o
 """
 
 _DRAWS = """\
-From the spread of this run's paired differences between two controllers: the number of draws whose 95 % interval \
-reaches just that far to each side, and the number with which a true difference of that size is found in 80 % of \
-studies. A spread from few draws is itself uncertain: with 3 draws by a factor of about 2.
+From the spread between draws of this run's paired differences between two controllers (in brackets): the number of \
+draws whose 95 % interval reaches just that far to each side / the number with which a true difference of that size is \
+found in 80 % of studies. A spread from few draws is itself uncertain: with 3 draws by a factor of about 2.
 """
 
 _DIFFERENCES = {
@@ -141,21 +141,15 @@ def draws_section(found: Iterable[Resolution]) -> list[str]:
     Returns:
         Lines of Markdown; none if no two controllers share two draws.
     """
-    headings = ["scenario", "controllers", "measure", "spread between draws", "from draws", "difference", "draws"]
-    rows = [
-        [
-            _place_of(r.dataset, r.variant, r.scenario),
-            " - ".join(r.controllers),
-            r.measure,
-            f"{r.spread:.3f}",
-            str(r.n_draws),
-            f"{r.difference:g}",
-            str(r.draws),
-            str(r.draws_for_power),
-        ]
-        for r in found
-    ]
-    return ["## How many draws it takes", "", _DRAWS, *_table([*headings, "for 80 %"], rows)] if rows else []
+    rows: Rows = []
+    columns: dict[str, str] = {}
+    for key, group in groupby(found, key=lambda r: (r.dataset, r.variant, r.scenario, r.controllers)):
+        row = {r.measure: r for r in group}
+        columns |= {name: f"{name} to {r.difference:g}" for name, r in row.items()}
+        cells = [f"{r.draws} / {r.draws_for_power} ({r.spread:.3f})" for r in row.values()]
+        rows.append([_place_of(*key[:3]), " - ".join(key[3]), *cells, str(min(r.n_draws for r in row.values()))])
+    headings = ["scenario", "controllers", *columns.values(), "from draws"]
+    return ["## How many draws it takes", "", _DRAWS, *_table(headings, rows)] if rows else []
 
 
 def _fault_cells(columns: Columns) -> list[str]:

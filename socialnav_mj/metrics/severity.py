@@ -8,11 +8,11 @@ the leg free to recoil. The limits are pain thresholds of adults, not of injury,
 What the simulation's forces are, and are not: a replayed person is a mocap body, infinitely heavy and never pushed
 back, behind a soft contact (`solref 0.05 1`: critically damped, time constant 0.05 s, whatever the mass). The robot is
 brought to the person's speed over about 0.1 s, against its wheels' friction (up to 63 N sideways) and servo (32 N). In
-students003 (154 contacts of one draw, potential field) a free robot feels about 180 N per m/s of closing speed plus
-34 N, 556 N at most; flesh on bone would give 659 N per m/s (`flesh_force`). So *impulse* and *closing speed* are sound,
-and the *peak force* of a free robot is a lower bound. Between two people the robot is *clamped*: neither yields, the
-softness of the two contacts no longer lessens the force, and it reaches 27 000 N. That number means only that the
-people of the recording stood where the robot was; such contacts are counted by themselves (`clamped`), without a force.
+students003 (three draws, four scenarios, potential_field and go_straight) no free robot felt more than 556 N; flesh on
+bone would give 659 N per m/s (`flesh_force`). So *impulse* and *closing speed* are sound, and the *peak force* of a
+free robot is a lower bound. Between two people the robot is *clamped*: neither yields, the softness of the two contacts
+no longer lessens the force, and it reaches 83 000 N. That number means only that the people of the recording walked
+where the robot was; such contacts are counted by themselves (`clamped`), without a force.
 """
 
 from enum import IntEnum
