@@ -304,7 +304,7 @@ def test_what_a_kill_leaves_is_the_checkpoint_as_it_was(killed_and_resumed, tmp_
     for name, content in after_kill.items():
         (tmp_path / name).write_bytes(content)
     model = model_of(SMALL)
-    state = torch.load(tmp_path / "checkpoint.pt", weights_only=True)
+    state = torch.load(tmp_path / "checkpoint.pt", weights_only=True)["model"]
     with np.load(tmp_path / "buffer.npz", allow_pickle=False) as buffer:
         model.restore(state, dict(buffer))
     assert model.num_timesteps == 200 * SMALL.n_slots and model.updates == state["updates"]

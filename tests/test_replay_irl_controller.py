@@ -1,5 +1,6 @@
 """The learned policy without torch: its forward pass, its files, and an installation that cannot train."""
 
+import hashlib
 import json
 import os
 import pickle

@@ -1,5 +1,6 @@
 """The learned policy (paper section III-A): a trained SAC actor in numpy, without torch."""
 
+import hashlib
 import json
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -29,12 +30,19 @@ class TrainedPolicy:
 
     card: dict[str, Any]
     """Data, seed, configuration and metrics."""
+    checksum: str
+    """sha256 of the weights' file."""
     features: FeatureSet
     """What the networks see."""
     actor: tuple[tuple[Array, Array], ...]
     """(weight (out, in), bias (out,)) of each layer."""
     reward: tuple[tuple[Array, Array], ...]
     """The same of the reward network."""
+
+    @property
+    def training_seed(self) -> int:
+        """Seed of the training."""
+        return int(self.card["config"]["seed"])
 
     def action(self, state: Array) -> Array:
         """Deterministic action of the actor: tanh of the mean.
@@ -85,7 +93,30 @@ def shipped_policies() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in policies_folder().glob("*.safetensors")))
 
 
-@lru_cache(maxsize=32)
+def policy_path(name_or_path: str) -> Path:
+    """Where a policy's weights are.
+
+    Args:
+        name_or_path: Name of a shipped policy, or path of a .safetensors file.
+
+    Returns:
+        The .safetensors file; its card is beside it.
+
+    Raises:
+        PolicyError: If there is none.
+    """
+    if name_or_path.endswith(".safetensors"):
+        path = Path(name_or_path)
+    else:
+        path = policies_folder() / f"{name_or_path}.safetensors"
+    if not path.is_file():
+        raise PolicyError(
+            f"there is no policy {name_or_path!r}; available: {', '.join(shipped_policies())}, or the path of a "
+            ".safetensors file"
+        )
+    return path
+
+
 def load_policy(name_or_path: str) -> TrainedPolicy:
     """Read a policy: NAME.safetensors and NAME.json; never runs code from them.
 
@@ -98,22 +129,23 @@ def load_policy(name_or_path: str) -> TrainedPolicy:
     Raises:
         PolicyError: If there is none, or its files are damaged or contradict each other.
     """
-    path = (
-        Path(name_or_path)
-        if name_or_path.endswith(".safetensors")
-        else policies_folder() / f"{name_or_path}.safetensors"
-    )
-    if not path.is_file():
-        raise PolicyError(
-            f"there is no policy {name_or_path!r}; available: {', '.join(shipped_policies())}, or the path of a "
-            ".safetensors file"
-        )
+    path = policy_path(name_or_path)
+    return _read(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=32)
+def _read(path: Path, _modified: int) -> TrainedPolicy:
+    """Read a policy once for each state of its file."""
     try:
         card = json.loads(path.with_suffix(".json").read_text())
         tensors = load_file(path)
         features = feature_set(card["config"]["features"])
         policy = TrainedPolicy(
-            card=card, features=features, actor=_layers(tensors, "actor"), reward=_layers(tensors, "reward")
+            card=card,
+            checksum=hashlib.sha256(path.read_bytes()).hexdigest(),
+            features=features,
+            actor=_layers(tensors, "actor"),
+            reward=_layers(tensors, "reward"),
         )
     except (OSError, ValueError, KeyError, TypeError, SafetensorError) as error:
         raise PolicyError(f"{path} and its card {path.with_suffix('.json').name} are no policy: {error!r}") from error
@@ -153,11 +185,18 @@ class ReplayIRL(TwistController):
 
     policy: str = DEFAULT_POLICY
     """Name of a shipped policy, or path of a .safetensors file."""
+    checksum: str | None = None
+    """sha256 that the weights must have; None takes them as they are. It travels in every episode."""
     name: str = "replay_irl"
     _trained: TrainedPolicy = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._trained = load_policy(self.policy)
+        if self.checksum not in (None, self._trained.checksum):
+            raise PolicyError(
+                f"policy {self.policy!r} has checksum {self._trained.checksum}, but {self.checksum} is asked for"
+            )
+        self.checksum = self._trained.checksum
 
     def twist(self, observation: Observation) -> Array:
         """The actor's mean action.

@@ -3,6 +3,8 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
+from socialnav_mj.features import feature_set
+
 Partition = Literal["fused", "importance", "segment"]
 
 
@@ -89,9 +91,23 @@ class TrainingConfig:
             raise ValueError(
                 f"partition = {self.partition!r} is not allowed; allowed: {', '.join(get_args(Partition))}"
             )
-        for name in ("scene_steps", "n_slots", "batch_size", "updates_per_scene_step", "checkpoint_every"):
+        for name in (
+            "scene_steps",
+            "n_slots",
+            "batch_size",
+            "updates_per_scene_step",
+            "updates_per_reward_step",
+            "checkpoint_every",
+        ):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: integers >= 1")
+        feature_set(self.features)
+        if not 0.0 <= self.gamma < 1.0:
+            raise ValueError(f"gamma = {self.gamma} is not allowed; allowed: numbers in [0, 1)")
+        for name in ("train_window", "validation_window", "test_window"):
+            begin, end = getattr(self, name)
+            if not 0.0 <= begin < end <= 1.0:
+                raise ValueError(f"{name} = {(begin, end)} is not allowed; allowed: 0 <= begin < end <= 1")
         if not self.datasets or not self.shares:
             raise ValueError("datasets and shares must not be empty")
 

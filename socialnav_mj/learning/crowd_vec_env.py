@@ -64,7 +64,6 @@ class CrowdVecEnv(VecEnv):
         self._random = np.random.default_rng(seed)
         self._scenes = 0
         self._actions = np.zeros((n_slots, 2))
-        self.scene_time = 0.0
         size = features.size + 2
         super().__init__(
             n_slots, spaces.Box(-np.inf, np.inf, (size,), np.float32), spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -95,8 +94,7 @@ class CrowdVecEnv(VecEnv):
         Returns:
             Shape (n_slots, state size).
         """
-        while self.environment.reset().last():
-            self.environment = self._next_scene()
+        self.environment.reset()
         return self._states()[0]
 
     def step_async(self, actions: NDArray[Any]) -> None:
@@ -140,7 +138,7 @@ class CrowdVecEnv(VecEnv):
         """What the guide would do now.
 
         Returns:
-            (speed, turn) in [-1, 1], shape (n_slots, 2); 0 in empty slots.
+            (speed, turn) in [-1, 1], shape (n_slots, 2); of no meaning in empty slots.
         """
         task = self.environment.task
         wheel_speed = self._guide.act(task.get_observation(self.environment.physics))
@@ -177,17 +175,18 @@ class CrowdVecEnv(VecEnv):
         """Nothing to close."""
 
     def seed(self, seed: int | None = None) -> list[int | None]:
-        """Seed the draws of the scenes to come.
+        """Leave the draws as they are: they are seeded once, when the crowd is made.
+
+        stable-baselines3 seeds its environments with the learner's seed, which would repeat the first scene's draw and,
+        after a resume, the scenes of the training's beginning.
 
         Args:
-            seed: None leaves them.
+            seed: Not used.
 
         Returns:
-            The seed for every environment.
+            None for every environment.
         """
-        if seed is not None:
-            self._random = np.random.default_rng(seed)
-        return [seed] * self.num_envs
+        return [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of this object, for every environment.

@@ -66,7 +66,7 @@ def demonstrate(
         ValueError: If nobody moves that far.
     """
     dt = scenario.control_timestep
-    times = np.arange(int(recording.duration / dt) + 1) * dt
+    times = np.arange(int(recording.duration / dt + 1e-6) + 1) * dt
     crowd = recording.at(times)
     apart = np.ones((recording.n_people, recording.n_people), dtype=bool)
     np.fill_diagonal(apart, False)
@@ -87,7 +87,8 @@ def demonstrate(
         under_way[rows[ended != 0]] = False
         rows = rows[ended == 0]
         if rows.size:
-            turn = wrap_angle(crowd.heading[k + 1, rows] - crowd.heading[k, rows]) / dt
+            # As a robot's is measured: the turn of the step that led here.
+            turn = np.nan_to_num(wrap_angle(crowd.heading[k, rows] - crowd.heading[max(k - 1, 0), rows])) / dt
             view = _view(
                 recording, crowd.position[k], crowd.velocity[k], crowd.heading[k], turn, rows, here, apart, scenario
             )

@@ -204,7 +204,7 @@ class ReplayIRL(SAC):
         return mirrored(self.features, states, self.random.random(count) < 0.5)
 
     def checkpoint(self) -> dict[str, Any]:
-        """Everything that goes on after a resume, apart from the scene, which begins anew, and the buffer.
+        """What goes on after a resume; the scene and the draws of samples begin anew, the buffer is stored beside it.
 
         Returns:
             Tensors and plain values, readable with torch.load(weights_only=True).

@@ -16,7 +16,6 @@ from stable_baselines3.common.logger import configure
 import tasks
 from socialnav_mj import metrics
 from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
-from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.environment import make_scenario
 from socialnav_mj.features import feature_set
 from socialnav_mj.files import write_whole, written_whole
@@ -91,7 +90,8 @@ def train(
             for recording in training
         ]
     )
-    done = _read_history(folder)
+    stored = torch.load(folder / CHECKPOINT, weights_only=True) if (folder / CHECKPOINT).exists() else None
+    history: list[dict[str, Any]] = [] if stored is None else stored["history"]
     env = CrowdVecEnv(
         training,
         features,
@@ -101,31 +101,35 @@ def train(
         pedestrian_radius=config.pedestrian_radius,
         guide=config.guide,
         # A resumed training goes on with scenes it has not seen.
-        seed=config.seed + 1_000_003 * len(done),
+        seed=config.seed + 1_000_003 * len(history),
     )
     model = ReplayIRL(env, experts, features, config)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
-    if (folder / CHECKPOINT).exists():
+    if stored is not None:
         with np.load(folder / BUFFER, allow_pickle=False) as buffer:
-            model.restore(torch.load(folder / CHECKPOINT, weights_only=True), dict(buffer))
+            model.restore(stored["model"], dict(buffer))
     left = config.scene_steps * env.num_envs - model.num_timesteps
     if left > 0:
-        callback = _Checkpoints(config, folder, recordings, done, progress)
+        callback = _Checkpoints(config, folder, recordings, history, progress)
         model.learn(left, callback=callback, reset_num_timesteps=False, log_interval=1)
-    _complete_card(folder / BEST, config, recordings)
+    _complete_card(folder / BEST, config, recordings, history)
     return folder / BEST
 
 
-def _complete_card(path: Path, config: TrainingConfig, recordings: list[Recording]) -> None:
+def _complete_card(
+    path: Path, config: TrainingConfig, recordings: list[Recording], history: list[dict[str, Any]]
+) -> None:
     """Add what the best policy does on the parts it was trained on, chosen on, and has never seen."""
     card_path = path.with_suffix(".json")
     card = json.loads(card_path.read_text())
+    if "metrics" in card:
+        return
     parts = {"in_sample": config.train_window, "validation": config.validation_window, "held_out": config.test_window}
     card["metrics"] = {
         name: {"window": part, **validate(path, recordings, part=part, shares=config.validation_shares)}
         for name, part in parts.items()
     }
-    card["history"] = _read_history(path.parent)
+    card["history"] = history
     write_whole(card_path, (json.dumps(card, indent=1, sort_keys=True) + "\n").encode())
 
 
@@ -143,7 +147,6 @@ def validate(
     Returns:
         success, intrusion_share, time_under_way [s], n_agents.
     """
-    load_policy.cache_clear()
     success: list[float] = []
     time: list[float] = []
     intrusions = steps = 0.0
@@ -177,12 +180,6 @@ def _claim(folder: Path, config: TrainingConfig) -> None:
                 f"{path}: the training there has {key} = {found.get(key)!r}, but {wanted.get(key)!r} is asked for; "
                 "choose another output folder"
             )
-
-
-def _read_history(folder: Path) -> list[dict[str, Any]]:
-    path = folder / HISTORY
-    history: list[dict[str, Any]] = json.loads(path.read_text()) if path.exists() else []
-    return history
 
 
 class _Checkpoints(BaseCallback):
@@ -262,9 +259,9 @@ class _Checkpoints(BaseCallback):
         model.logger.dump(model.num_timesteps)
         with written_whole(folder / BUFFER) as part:
             np.savez(part, **model.replay_buffer.state())  # type: ignore[arg-type]
-        with written_whole(folder / CHECKPOINT) as part:
-            torch.save(model.checkpoint(), part)
         self._history.append(entry)
+        with written_whole(folder / CHECKPOINT) as part:
+            torch.save({"model": model.checkpoint(), "history": self._history}, part)
         write_whole(folder / HISTORY, (json.dumps(self._history, indent=1) + "\n").encode())
         self._begin += perf_counter() - begin
         return validation
