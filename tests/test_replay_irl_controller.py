@@ -103,6 +103,7 @@ def test_policy_is_part_of_the_configuration(tmp_path):
     assert config == {
         "class": "socialnav_mj.controllers.replay_irl:ReplayIRL",
         "policy": path,
+        "checksum": hashlib.sha256(Path(path).read_bytes()).hexdigest(),
         "name": "replay_irl",
     }
     assert make_controller(f"replay_irl(policy={path!r})").policy == path
