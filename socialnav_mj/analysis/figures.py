@@ -17,6 +17,7 @@ from socialnav_mj.analysis.style import (
     LINES,
     LOOKS,
     MARKERS,
+    OUTLINE,
     SCENARIO_TITLES,
     SHADES,
     new_figure,
@@ -168,7 +169,15 @@ def _bar(axes: Axes, x: int, table: LevelTable, scenario: str, method: str, meas
         return
     look = LOOKS[method]
     axes.bar(x, level.interval.mean, width=0.8, color=look.colour, hatch=look.hatch, hatchcolor="white")
-    axes.errorbar(x - 0.12, level.interval.mean, yerr=_reach(level), color="black", linewidth=1.1, zorder=4)
+    axes.errorbar(
+        x - 0.12,
+        level.interval.mean,
+        yerr=_reach(level),
+        color="black",
+        linewidth=1.1,
+        zorder=4,
+        path_effects=[OUTLINE],
+    )
     trainings = table.trainings(method)
     for k, training in enumerate(trainings):
         single = table.find(scenario, method, measure, training)
@@ -180,7 +189,9 @@ def _bar(axes: Axes, x: int, table: LevelTable, scenario: str, method: str, meas
 def _human_band(axes: Axes, level: Level | None) -> None:
     if level is None or not np.isfinite(level.interval.mean):
         return
-    axes.axhline(level.interval.mean, color=LOOKS[HUMAN].colour, linestyle=LOOKS[HUMAN].line, linewidth=1.2, zorder=5)
+    look = LOOKS[HUMAN]
+    axes.axhline(level.interval.mean, color="white", linewidth=2.4, zorder=4.5)
+    axes.axhline(level.interval.mean, color=look.colour, linestyle=look.line, linewidth=1.2, zorder=5)
     if np.isfinite(level.interval.low):
         axes.axhspan(level.interval.low, level.interval.high, color="#000000", alpha=0.12, linewidth=0.0, zorder=1)
 
@@ -195,7 +206,10 @@ def _lines(table: LevelTable, drawing: Drawing) -> Figure:
             points = [(x, level) for x, level in found if level is not None]
             look = LOOKS[method]
             _error_bars(axes, points, color=look.colour, marker=look.marker, linestyle=look.line)
-        shares = [SCENARIO_TITLES.get(s, s).removeprefix("scenario ").replace(": ", "\n") for s in scenarios]
+        shares = [
+            SCENARIO_TITLES.get(s, s).removeprefix("scenario ").removesuffix(" agents").replace(": ", "\n")
+            for s in scenarios
+        ]
         axes.set_xticks(range(len(scenarios)), shares)
         axes.set_xlim(-0.4, len(scenarios) - 0.6)
         axes.set_xlabel("scenario, share of people replaced by agents")

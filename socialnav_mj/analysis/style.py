@@ -9,6 +9,7 @@ from typing import Any, Literal
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from socialnav_mj.analysis.paired import HUMAN
 from socialnav_mj.analysis.panel import MIXED, POTENTIAL_FIELD, REPLAY_IRL
@@ -17,6 +18,8 @@ from socialnav_mj.files import written_whole
 WIDTH = 7.2
 """Of every figure: a text width of two columns [inch]."""
 DOTS_PER_INCH = 200
+OUTLINE = withStroke(linewidth=2.4, foreground="white")
+"""Behind dark lines that cross dark bars."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +38,7 @@ LOOKS: dict[str, Look] = {
     POTENTIAL_FIELD: Look(label="potential field", colour="#DDAA33", hatch="", marker="o", line="-"),
     REPLAY_IRL: Look(label="ReplayIRL", colour="#004488", hatch="////", marker="s", line="--"),
     MIXED: Look(label="mixed", colour="#BB5566", hatch="....", marker="D", line="-."),
-    HUMAN: Look(label="recorded humans", colour="#000000", hatch="", marker="*", line=":"),
+    HUMAN: Look(label="recorded humans", colour="#000000", hatch="", marker="^", line=":"),
 }
 SHADES = ("#000000", "#004488", "#BB5566", "#DDAA33")
 """Dark to light, for whatever is no method; with MARKERS and LINES beside them."""
@@ -43,12 +46,12 @@ MARKERS = ("o", "s", "D", "^")
 LINES = ("-", "--", "-.", ":")
 
 SCENARIO_TITLES = {
-    "scenario_1": "scenario 1: 10 %",
-    "scenario_2": "scenario 2: 30 %",
-    "scenario_3": "scenario 3: 70 %",
-    "scenario_4": "scenario 4: 90 %",
+    "scenario_1": "scenario 1: 10 % agents",
+    "scenario_2": "scenario 2: 30 % agents",
+    "scenario_3": "scenario 3: 70 % agents",
+    "scenario_4": "scenario 4: 90 % agents",
 }
-"""Task: number and share of people who are replaced."""
+"""Task: its number, and the share of people whom agents replace."""
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib, so that every machine sets the same text
@@ -122,9 +125,9 @@ def short_title(scenario: str, place: int) -> str:
         place: Of the sub-figure, from 0.
 
     Returns:
-        As "(a) scenario 1: 10 %".
+        As "(a) scenario 1: 10 %", the share being that of agents.
     """
-    return f"({'abcdefgh'[place]}) {SCENARIO_TITLES.get(scenario, scenario)}"
+    return f"({'abcdefgh'[place]}) {SCENARIO_TITLES.get(scenario, scenario).removesuffix(' agents')}"
 
 
 def methods_of(found: Sequence[str]) -> list[str]:

@@ -1,0 +1,243 @@
+"""Claims on tables whose truth is known, and intervals that cover it as often as they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from agents import METHOD_VALUES, experiment_table, roster_of, rows_of, table_of
+
+from socialnav_mj.analysis import two_way
+from socialnav_mj.analysis.claims import CLAIMS, examine, verdict_of, verdict_of_all
+from socialnav_mj.analysis.claims_page import claims_page
+from socialnav_mj.analysis.held_out import HELD_OUT, IN_SAMPLE, VALIDATION, period_of_people
+from socialnav_mj.analysis.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry, Term, make_panel
+from socialnav_mj.analysis.two_way import two_way_interval
+from socialnav_mj.recordings import Recording
+
+SEEDS = (0, 1, 2)
+
+
+@pytest.fixture(autouse=True)
+def few_resamples(monkeypatch):
+    monkeypatch.setattr(two_way, "N_RESAMPLES", 999)
+
+
+def verdicts(table, trainings=SEEDS):
+    return {f.claim.key: f.verdict for f in examine(make_panel(table, roster_of(trainings)))}
+
+
+def changed(method, quantity, means):
+    return METHOD_VALUES | {method: METHOD_VALUES[method] | {quantity: means}}
+
+
+def test_every_claim_holds_where_all_is_as_the_paper_says():
+    assert verdicts(experiment_table(noise=0.002)) == {claim.key: "holds" for claim in CLAIMS}
+
+
+@pytest.mark.parametrize(
+    ("method", "quantity", "means", "failing"),
+    [
+        ("mix", "success", [0.7, 0.8, 0.75, 0.95], {"a"}),
+        ("pf", "speed", [0.9, 0.9, 0.9, 0.78], {"b1", "f1", "f2"}),
+        ("irl", "steps", [30.0, 25.0, 40.0, 10.0], {"b3", "b4", "e1", "e2"}),
+        ("irl", "success", [0.6, 0.5, 0.7, 0.8], {"c1"}),
+        ("irl", "success", [0.6, 0.7, 0.85, 0.93], {"c2"}),
+        ("mix", "steps", [31.0, 26.0, 15.5, 14.0], {"e1", "e2"}),
+    ],
+)
+def test_claims_fail_where_one_scenario_contradicts(method, quantity, means, failing):
+    found = verdicts(experiment_table(changed(method, quantity, means), noise=0.002))
+    assert failing <= {key for key, verdict in found.items() if verdict == "fails"}
+    untouched = {"c1", "c2"} - failing if quantity != "success" else {"b1", "b2", "b3", "d1"}
+    assert all(found[key] == "holds" for key in untouched)
+
+
+def test_claim_is_undecided_where_draws_and_trainings_wander_more_than_the_effect():
+    values = changed("mix", "success", [0.61, 0.71, 0.81, 0.91])
+    assert verdicts(experiment_table(values, noise=0.06))["a"] == "undecided"
+
+
+def test_claim_about_all_scenarios_is_undecided_without_one_unless_another_contradicts():
+    table = experiment_table(noise=0.002, scenarios=("scenario_1", "scenario_2", "scenario_3"))
+    found = {f.claim.key: f for f in examine(make_panel(table, roster_of(SEEDS)))}
+    assert found["a"].verdict == "undecided" and len(found["a"].missing) == 2
+    assert found["c1"].verdict == "holds"
+    values = changed("mix", "success", [0.4, 0.8, 0.9, 0.95])
+    table = experiment_table(values, noise=0.002, scenarios=("scenario_1", "scenario_2", "scenario_3"))
+    assert verdicts(table)["a"] == "fails"
+
+
+def test_verdict_says_on_which_side_of_nothing_the_interval_lies():
+    assert [verdict_of(*ends) for ends in ((0.1, 0.2), (-0.2, -0.1), (-0.1, 0.1), (0.0, 0.1))] == [
+        "holds",
+        "fails",
+        "undecided",
+        "undecided",
+    ]
+    assert verdict_of(float("nan"), float("nan")) == "undecided"
+    assert verdict_of_all(["holds", "undecided", "fails"]) == "fails"
+    assert verdict_of_all(["holds", "holds"]) == "holds"
+    assert verdict_of_all(["holds", "undecided"]) == verdict_of_all([]) == "undecided"
+
+
+def test_page_gives_rule_verdicts_effects_and_the_weakest_comparison_of_each_variant():
+    default = examine(make_panel(experiment_table(noise=0.002), roster_of(SEEDS)))
+    worse = experiment_table(changed("mix", "success", [0.7, 0.8, 0.75, 0.95]), noise=0.002)
+    other = examine(make_panel(worse, roster_of(SEEDS)))
+    page = claims_page(
+        {"default": default, "v": other}, titles={"default": "default", "v": "variant"}, command="run it"
+    )
+    assert "Command: `run it`" in page and "**fails** if at least one fails" in page
+    row = next(line for line in page.splitlines() if line.startswith("| (a) "))
+    assert row.endswith("| holds | fails |")
+    weakest = next(line for line in page.splitlines() if line.startswith("| variant | fails "))
+    assert "scenario_3: mixed - potential field | -0.05" in weakest
+    assert all(claim.sentence in page for claim in CLAIMS)
+
+
+def test_interval_of_one_column_is_students():
+    values = np.random.default_rng(3).standard_normal(12)
+    interval = two_way_interval(values[:, None], trained=False)
+    half = 2.201 * values.std(ddof=1) / np.sqrt(12)  # Student's 97.5 % quantile with 11 degrees of freedom
+    assert interval.mean == pytest.approx(values.mean())
+    assert 0.5 * (interval.high - interval.low) == pytest.approx(half, rel=0.1)
+    assert (interval.low, interval.high) == (interval.low_given, interval.high_given)
+
+
+@pytest.mark.parametrize(("by_draw", "by_training", "within"), [(1.0, 0.0, 0.3), (0.3, 1.0, 0.3), (1.0, 1.0, 1.0)])
+def test_intervals_cover_the_truth_as_often_as_they_say(monkeypatch, by_draw, by_training, within):
+    """10 draws, 3 trainings, 300 studies: 95 % with a standard error of 1.3 %; too wide is allowed, too narrow not."""
+    monkeypatch.setattr(two_way, "N_RESAMPLES", 400)
+    random = np.random.default_rng(5)
+    covered = covered_given = 0
+    for _ in range(300):
+        trainings = by_training * random.standard_normal((1, 3))
+        cells = by_draw * random.standard_normal((10, 1)) + trainings + within * random.standard_normal((10, 3))
+        interval = two_way_interval(cells, trained=True)
+        covered += interval.low <= 0.0 <= interval.high
+        covered_given += interval.low_given <= trainings.mean() <= interval.high_given
+    assert covered / 300 >= 0.92
+    assert 0.91 <= covered_given / 300 <= 0.985
+
+
+def test_interval_of_equal_cells_is_a_point_and_missing_cells_are_left_out():
+    cells = np.full((5, 3), 2.0)
+    cells[1, 2] = cells[4] = np.nan
+    interval = two_way_interval(cells, trained=True)
+    assert (interval.mean, interval.low, interval.high, interval.n_draws) == (2.0, 2.0, 2.0, 4)
+
+
+def test_interval_says_why_there_is_none():
+    assert "needs 3" in two_way_interval(np.ones((2, 3)), trained=True).note
+    assert two_way_interval(np.full((5, 3), np.nan), trained=True).note == "no agent has a value"
+    alone = two_way_interval(np.arange(5.0)[:, None], trained=True)
+    assert "one training" in alone.note and np.isfinite(alone.low)
+
+
+def small_panel():
+    """Two draws of two agents: the potential field loses agent 1 of draw 0, the learned one never spawns it."""
+    nan = None
+    rows = [
+        *rows_of(
+            "pf",
+            "scenario_1",
+            0,
+            {"success": [True, False], "completion_time": [4.0, nan], "average_speed": [1.0, 3.0]},
+        ),
+        *rows_of(
+            "pf", "scenario_1", 1, {"success": [True, True], "completion_time": [6.0, 8.0], "average_speed": [1.0, 1.0]}
+        ),
+        *rows_of(
+            "irl0",
+            "scenario_1",
+            0,
+            {"success": [True, False], "completion_time": [5.0, nan], "average_speed": [0.5, nan]},
+        ),
+        *rows_of(
+            "irl0",
+            "scenario_1",
+            1,
+            {"success": [True, False], "completion_time": [9.0, 9.0], "average_speed": [0.5, 0.0]},
+        ),
+    ]
+    return make_panel(table_of(rows), roster_of([0]))
+
+
+def minus(measure):
+    term = Term(factor=1.0, method=POTENTIAL_FIELD, scenario="scenario_1", measure=measure)
+    return [term, replace(term, factor=-1.0, method=REPLAY_IRL)]
+
+
+def test_contrast_is_paired_by_agent():
+    """Draw 0: agent 1 has no speed under one of the two, so agent 0 alone counts: 1 - 0.5. Draw 1: (0.5 + 1) / 2."""
+    np.testing.assert_allclose(small_panel().contrast(minus("average_speed")), [[0.5], [0.75]])
+    np.testing.assert_allclose(small_panel().contrast(minus("success")), [[0.0], [0.5]])
+
+
+def test_common_agents_are_those_that_every_controller_brought_home():
+    """Agent 1 failed under the learned policy in both draws, so only agent 0 of each counts, for both."""
+    measure = f"completion_time_success{COMMON}"
+    np.testing.assert_allclose(small_panel().contrast(minus(measure)), [[-1.0], [-3.0]])
+    np.testing.assert_allclose(small_panel().contrast(minus(measure)[:1]), [[4.0], [6.0]])
+    # without the ending each has its own successes
+    np.testing.assert_allclose(small_panel().contrast(minus("completion_time_success")[:1]), [[4.0], [7.0]])
+
+
+def test_share_of_steps_weighs_agents_by_their_steps():
+    columns = {"intrusion_share": [0.5, 0.0], "active_steps": [10, 30]}
+    panel = make_panel(table_of(rows_of("pf", "scenario_1", 0, columns)), roster_of([]))
+    term = Term(factor=1.0, method=POTENTIAL_FIELD, scenario="scenario_1", measure="intrusion_share_of_steps")
+    np.testing.assert_allclose(panel.contrast([term]), [[0.125]])
+
+
+def test_trainings_are_compared_each_with_its_own_mixed_policy():
+    rows = [
+        row
+        for name, speed in (("pf", 1.0), ("irl0", 0.5), ("irl1", 0.7), ("mix0", 0.6), ("mix1", 0.9))
+        for row in rows_of(name, "scenario_1", 0, {"average_speed": [speed]})
+    ]
+    panel = make_panel(table_of(rows), roster_of([0, 1]))
+    mixed = Term(factor=1.0, method=MIXED, scenario="scenario_1", measure="average_speed")
+    np.testing.assert_allclose(panel.contrast([mixed, replace(mixed, factor=-1.0, method=REPLAY_IRL)]), [[0.1, 0.2]])
+    np.testing.assert_allclose(panel.contrast([mixed], trainings=[1]), [[0.9]])
+
+
+def test_panel_does_not_depend_on_the_order_of_rows():
+    table = experiment_table(noise=0.02, n_draws=3, n_agents=8)
+    shuffled = table.take(pa.array(np.random.default_rng(0).permutation(table.num_rows)))
+    one, other = make_panel(table, roster_of(SEEDS)), make_panel(shuffled, roster_of(SEEDS))
+    for part in CLAIMS[0].parts:
+        np.testing.assert_array_equal(one.contrast(part.terms), other.contrast(part.terms))
+
+
+def test_panel_refuses_two_controllers_in_one_role_and_two_recordings():
+    table = table_of(rows_of("pf", "scenario_1", 0, {"success": [True]}))
+    with pytest.raises(ValueError, match="'pf' and 'weak' are both potential_field"):
+        make_panel(table, [*roster_of([]), Entry(controller="weak", method=POTENTIAL_FIELD)])
+    other = table.set_column(0, "dataset", pa.array(["else"]))
+    with pytest.raises(ValueError, match="2 recordings"):
+        make_panel(pa.concat_tables([table, other]), roster_of([]))
+
+
+def crowd():
+    """People who appear at 0, 5, 6.5, 7 and 9 s of 10 s."""
+    begin = [0.0, 5.0, 6.5, 7.0, 9.0]
+    return Recording(
+        name="made",
+        variant="text",
+        frame_rate=25.0,
+        ids=np.arange(1, 6),
+        times=tuple(np.array([t, 10.0]) for t in begin),
+        positions=tuple(np.array([[0.0, k], [1.0, k]]) for k in range(5)),
+        checksum="0",
+    )
+
+
+def test_people_are_held_out_who_appear_after_training_and_validation():
+    card = {"datasets": ["made"], "train_window": [0.0, 0.6], "validation_window": [0.6, 0.7]}
+    periods = period_of_people(crowd(), [card, dict(card)])
+    assert periods == {1: IN_SAMPLE, 2: IN_SAMPLE, 3: VALIDATION, 4: HELD_OUT, 5: HELD_OUT}
+    assert set(period_of_people(crowd(), [card | {"datasets": ["zara01"]}]).values()) == {HELD_OUT}
+    with pytest.raises(ValueError, match="different parts of made"):
+        period_of_people(crowd(), [card, card | {"train_window": [0.0, 0.5]}])

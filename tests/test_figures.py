@@ -1,0 +1,151 @@
+"""Figures exist, say what they show in text, are the same for the same numbers, and survive missing ones."""
+
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+from agents import METHOD_VALUES, experiment_table, roster_of
+from toy_policies import write_toy
+
+from socialnav_mj.analysis import style, two_way
+from socialnav_mj.analysis.figures import FIGURES, draw_figures, draw_sweep
+from socialnav_mj.analysis.levels import LEVEL_MEASURES, LevelTable, levels
+from socialnav_mj.analysis.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
+from socialnav_mj.analysis.reward_map import MOTIONS, REACH, draw_reward_maps, reward_map
+from socialnav_mj.analysis.style import LOOKS
+from socialnav_mj.controllers.replay_irl import load_policy
+
+SEEDS = (0, 1, 2)
+
+
+def level_table(**kwargs):
+    return LevelTable(rows=tuple(levels(make_panel(experiment_table(**kwargs), roster_of(SEEDS)))))
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
+
+
+@pytest.fixture(scope="module")
+def table():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(two_way, "N_RESAMPLES", 200)
+        return level_table(noise=0.02)
+
+
+def texts(path):
+    """All text of an SVG."""
+    return " ".join(
+        "".join(element.itertext()) for element in ElementTree.parse(path).iter() if element.tag.endswith("text")
+    )
+
+
+def grey(colour):
+    """Brightness of "#rrggbb" in [0, 1] (Rec. 601)."""
+    return sum(w * int(colour[k : k + 2], 16) / 255.0 for w, k in ((0.299, 1), (0.587, 3), (0.114, 5)))
+
+
+def test_levels_are_the_means_of_the_table_within_the_interval(table):
+    for method, short in (("potential_field", "pf"), ("replay_irl", "irl"), ("mixed", "mix"), ("human", "human")):
+        for place, scenario in enumerate(table.scenarios):
+            level = table.find(scenario, method, "average_speed")
+            assert level.interval.mean == pytest.approx(METHOD_VALUES[short]["speed"][place], rel=0.05)
+            assert level.interval.low < level.interval.mean < level.interval.high
+    assert len(table.rows) == 4 * (2 + 2 * 4) * len(LEVEL_MEASURES)
+    each = [table.find("scenario_1", MIXED, "success", k).interval.mean for k in SEEDS]
+    assert np.mean(each) == pytest.approx(table.find("scenario_1", MIXED, "success").interval.mean)
+
+
+def test_intervals_of_shares_end_at_0_and_1(table):
+    for row in table.rows:
+        if row.measure == "success":
+            assert 0.0 <= row.interval.low <= row.interval.high <= 1.0
+
+
+def test_five_figures_appear_as_png_and_svg_with_their_labels(table, tmp_path):
+    paths = draw_figures(table, tmp_path)
+    assert sorted(p.name for p in paths) == sorted(f"{d.name}.{e}" for d in FIGURES for e in ("png", "svg"))
+    for drawing in FIGURES:
+        assert (tmp_path / f"{drawing.name}.png").read_bytes().startswith(b"\x89PNG")
+        text = texts(tmp_path / f"{drawing.name}.svg")
+        for method in METHODS:
+            assert LOOKS[method].label in text
+        for row in drawing.rows:
+            assert all(line in text for line in row.label.split("\n"))
+        if drawing.bars:
+            assert all(f"({'abcd'[k]}) scenario {k + 1}" in text for k in range(4))
+            assert "each training" in text
+    assert "1.2 m" in texts(tmp_path / "figure_4_intrusions.svg")
+
+
+def test_equal_levels_give_equal_files(table, tmp_path):
+    first, second = draw_figures(table, tmp_path / "a"), draw_figures(table, tmp_path / "b")
+    for one, other in zip(first, second, strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+
+
+def test_figures_do_without_intervals_and_without_a_scenario(tmp_path):
+    sparse = level_table(n_draws=1, n_agents=6, scenarios=("scenario_1", "scenario_4"))
+    assert np.isnan(sparse.find("scenario_1", POTENTIAL_FIELD, "success").interval.low)
+    assert len(draw_figures(sparse, tmp_path)) == 10
+
+
+def test_methods_differ_in_brightness_and_hatch_or_marker():
+    looks = [LOOKS[method] for method in METHODS]
+    brightness = sorted(grey(look.colour) for look in looks)
+    assert min(np.diff(brightness)) > 0.1
+    assert len({look.hatch for look in looks[:3]}) == 3
+    assert len({look.marker for look in looks}) == len({look.line for look in looks}) == 4
+
+
+def test_sweep_runs_from_the_potential_field_to_the_learned_policy(table, tmp_path):
+    paths = draw_sweep({1.0: table, 2.0: table, 5.0: table}, table, tmp_path)
+    text = texts(paths[1])
+    for label in ("switch distance [m]", "PF", "IRL", "scenario 4: 90 % agents", "share of successful runs"):
+        assert label in text
+
+
+@pytest.fixture
+def shy(tmp_path):
+    """Its reward is tanh(-proximity of who is straight ahead)."""
+
+    def fill(weights):
+        weights[0, 6] = -1.0
+
+    return load_policy(write_toy(tmp_path, "shy", seed=0, reward=fill))
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_reward_map_shows_the_reward_of_a_walker_at_each_place(shy, motion):
+    drawn = reward_map(shy, motion)
+    assert drawn.alone == 0.0
+    row, column = np.abs(drawn.y).argmin(), np.abs(drawn.x - 1.5).argmin()
+    assert drawn.reward[row, column] == pytest.approx(np.tanh(-np.exp(-1.5 / 2.0)))
+    # beside and behind the agent, and outside its sector of 30 degrees, the walker changes nothing
+    behind = drawn.reward[:, drawn.x < -1e-9]
+    assert np.abs(behind).max() == 0.0
+    np.testing.assert_allclose(drawn.reward, drawn.reward[::-1], atol=1e-12)
+
+
+def test_reward_map_tells_motions_apart(tmp_path):
+    """Closing speed of whoever is ahead: 1 m/s of its own and the agent's 0.8 m/s; crossing and receding are less."""
+
+    def fill(weights):
+        weights[0, 6 + 12] = 1.0
+
+    policy = load_policy(write_toy(tmp_path, "brisk", seed=0, reward=fill))
+    row = slice(60, 61)
+    ahead = {motion: reward_map(policy, motion).reward[row, -1].item() for motion in MOTIONS}
+    expected = {"approaching": 1.8, "crossing": 0.8, "receding": -0.2}
+    assert ahead == pytest.approx({motion: np.tanh(speed / 2.0) for motion, speed in expected.items()})
+    with pytest.raises(ValueError, match="unknown motion 'hovering'; available: approaching, crossing, receding"):
+        reward_map(policy, "hovering")
+
+
+def test_reward_maps_are_drawn_with_titles_and_scale(shy, tmp_path):
+    paths = draw_reward_maps({"training 0": shy, "training 1": shy}, tmp_path)
+    text = texts(paths[1])
+    for label in ("walker approaching", "walker crossing", "walker receding", "training 1", "learned reward", "alone"):
+        assert label in text
+    assert paths[1].stat().st_size < 1_000_000 and REACH == 3.0

@@ -1,0 +1,49 @@
+"""Policies simple enough to be known by heart: one layer, in the files that trained ones come in."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from safetensors.numpy import save_file
+
+from socialnav_mj.features import N_FLAGS, feature_set
+from socialnav_mj.geometry import Array
+
+
+def write_toy(
+    folder: Path, name: str, *, seed: int, reward: Callable[[Array], None] | None = None, dataset: str = "tiny"
+) -> str:
+    """A policy that turns to its goal at speed, a little differently for each seed.
+
+    Args:
+        folder: Gets NAME.safetensors and NAME.json.
+        name: Of the policy.
+        seed: Training seed in its card.
+        reward: Fills the reward network's weights, shape (1, size + 2), in place; zeros by default.
+        dataset: In its card.
+
+    Returns:
+        Path of the policy.
+    """
+    size = feature_set("continuous").size + N_FLAGS
+    actor, weights = np.zeros((2, size)), np.zeros((1, size))
+    actor[1, 1] = 2.0 + 0.2 * seed  # turns with the sine of the goal's bearing
+    if reward is not None:
+        reward(weights)
+    tensors = {
+        "actor.0.weight": actor,
+        "actor.0.bias": np.array([1.5, 0.0]),
+        "reward.0.weight": weights,
+        "reward.0.bias": np.zeros(1),
+    }
+    save_file(tensors, folder / f"{name}.safetensors")
+    config = {
+        "features": "continuous",
+        "seed": seed,
+        "datasets": [dataset],
+        "train_window": [0.0, 0.6],
+        "validation_window": [0.6, 0.7],
+    }
+    (folder / f"{name}.json").write_text(json.dumps({"config": config}))
+    return str(folder / f"{name}.safetensors")
