@@ -1,6 +1,5 @@
 """Re-simulation of stored episodes: does the same configuration still give the same states?"""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,7 +11,7 @@ from joblib import Parallel, delayed
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_of
 from socialnav_mj.environment import build_environment
-from socialnav_mj.episode import Episode, EpisodeError, read_header
+from socialnav_mj.episode import Episode, read_header
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.rollout import package_versions, rollout
@@ -86,7 +85,7 @@ def verify(
 def _verify(path: Path, dataset: str | None, data_dir: str | None) -> Verdict:
     stored = ""
     try:
-        metadata = read_header(path)["metadata"] if path.suffix != ".rrd" else _trace_metadata(path)
+        metadata = _metadata(path)
         stored = str(metadata["state_hash"])
         then = metadata["versions"]
         now = package_versions(tuple(then))
@@ -95,6 +94,15 @@ def _verify(path: Path, dataset: str | None, data_dir: str | None) -> Verdict:
     except (ValueError, OSError, RuntimeError, KeyError, TypeError) as error:
         return Verdict(path=path, stored_hash=stored, hash="", error=f"{type(error).__name__}: {error}")
     return Verdict(path=path, stored_hash=stored, hash=str(episode.metadata["state_hash"]), other_versions=changed)
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    if path.suffix != ".rrd":
+        metadata: dict[str, Any] = read_header(path)["metadata"]
+        return metadata
+    from socialnav_mj.analysis.trace import read_metadata  # rerun is slow to import
+
+    return read_metadata(path)
 
 
 def resimulate(metadata: dict[str, Any], *, dataset: str | None = None, data_dir: str | None = None) -> Episode:
@@ -136,18 +144,3 @@ def resimulate(metadata: dict[str, Any], *, dataset: str | None = None, data_dir
 @lru_cache(maxsize=2)
 def _recording(dataset: str, variant: str, data_dir: str | None) -> Recording:
     return load_recording(dataset, variant=variant, data_dir=data_dir)
-
-
-def _trace_metadata(path: Path) -> dict[str, Any]:
-    """The configuration that a trace carries as a property of its recording."""
-    from rerun.chunk import RrdReader  # slow to import
-
-    try:
-        for chunk in RrdReader(path).stream().to_chunks():
-            batch = chunk.to_record_batch()
-            if "configuration" in batch.schema.names:
-                metadata: dict[str, Any] = json.loads(batch.column("configuration").to_pylist()[-1][0])
-                return metadata
-    except (RuntimeError, ValueError, TypeError, IndexError) as error:
-        raise EpisodeError(f"{path} is not a readable trace: {error}") from error
-    raise EpisodeError(f"{path} is no trace of ours: it carries no configuration")

@@ -26,7 +26,7 @@ ROWS = (
     {"analysis"},
     {"learning"},
     {"reproduction"},
-    {"benchmark", "cli"},
+    {"benchmark", "verification", "cli"},
 )
 # Controllers own no simulator: most rows above are closed to them.
 CONTROLLERS_MAY_IMPORT = {"resources", "geometry", "config", "observation", "features", "controllers"}

@@ -22,10 +22,12 @@ import json
 import uuid
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from rerun.chunk import RrdReader
 
 from socialnav_mj.analysis import blueprint as look
 from socialnav_mj.analysis.lanes import Change, assign_lanes, policy_changes, state_changes
@@ -33,7 +35,7 @@ from socialnav_mj.analysis.sink import Sink
 from socialnav_mj.analysis.touches import events, touch_rows
 from socialnav_mj.analysis.trace_scene import bounds, write_scene
 from socialnav_mj.config import Scenario
-from socialnav_mj.episode import Episode, Outcome, Partner
+from socialnav_mj.episode import Episode, EpisodeError, Outcome, Partner
 from socialnav_mj.files import written_whole
 from socialnav_mj.metrics.collisions import collisions
 from socialnav_mj.metrics.navigation import success
@@ -219,3 +221,26 @@ def _lane(
     sink.static(entity, style)
     states = rr.StateChange.columns(state=[c.state for c in changes])
     sink.columns(entity, [c.time for c in changes], states)
+
+
+def read_metadata(path: str | Path) -> dict[str, Any]:
+    """The metadata of the episode behind a trace, which the file carries as a property.
+
+    Args:
+        path: Of `write_trace`.
+
+    Returns:
+        `Episode.metadata`.
+
+    Raises:
+        EpisodeError: If the file is no trace of ours, or damaged.
+    """
+    try:
+        for chunk in RrdReader(path).stream().to_chunks():
+            batch = chunk.to_record_batch()
+            if "configuration" in batch.schema.names:
+                metadata: dict[str, Any] = json.loads(batch.column("configuration").to_pylist()[-1][0])
+                return metadata
+    except (RuntimeError, ValueError, TypeError, IndexError) as error:
+        raise EpisodeError(f"{path} is not a readable trace: {error}") from error
+    raise EpisodeError(f"{path} is no trace of ours: it carries no configuration")
