@@ -145,6 +145,7 @@ def test_variants_and_sweep_are_run_and_judged(experiment, tmp_path):
     assert {row["method"] for row in swept} == {"mixed"}
     assert (tmp_path / "figures" / "figure_6_switch_distance.svg").is_file()
     assert "## Switch distance" in page.read_text()
+    assert "turn limit per second" in (tmp_path / "figures" / "figure_8_variants.svg").read_text()
     text = (tmp_path / "claims.md").read_text()
     assert all(variant.title in text for variant in VARIANTS) and all(f"## ({c.key}) " in text for c in CLAIMS)
     provenance = json.loads((tmp_path / "provenance.json").read_text())

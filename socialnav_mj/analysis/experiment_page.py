@@ -8,7 +8,7 @@ from typing import Any
 from socialnav_mj.analysis.claims import Finding
 from socialnav_mj.analysis.figures import FIGURES
 from socialnav_mj.analysis.levels import Level, LevelTable
-from socialnav_mj.analysis.panel import COMMON, METHODS, MIXED
+from socialnav_mj.analysis.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
 from socialnav_mj.analysis.style import LOOKS, SCENARIO_TITLES
 
 _COLUMNS = (
@@ -29,7 +29,8 @@ Means over draws (a draw is one random choice of the people who are replaced) an
 bars of the figures: 95 % interval for other draws and other trainings, see claims.md. White dots: each training \
 alone. *Same agents*: those that every controller brought home without a collision. *Censored*: everybody who spawned; \
 who did not arrive counts with the time watched, a lower bound. *Recorded humans*: each replaced person on its own \
-track, scored by the same code; contacts by geometry. All numbers with their intervals: tables/levels.csv.
+track, scored by the same code; contacts by geometry. *(x n)*: n times the potential \
+field's. All numbers with their intervals: tables/levels.csv.
 """
 _HELD_OUT = """\
 Agents by when the person they replace appears: in the part of the recording that the policies were trained on, or \
@@ -48,6 +49,7 @@ def experiment_page(
     *,
     held_out: Mapping[str, Sequence[Level]],
     sweep: Mapping[float, LevelTable],
+    has_variants: bool,
     provenance: Mapping[str, Any],
 ) -> str:
     """The page.
@@ -57,6 +59,7 @@ def experiment_page(
         findings: The same setting's.
         held_out: Period: its levels.
         sweep: Switch distance [m]: levels.
+        has_variants: Whether there is a figure of the variants.
         provenance: Command, experiment, recording, policies, runs.
 
     Returns:
@@ -71,6 +74,8 @@ def experiment_page(
     lines += [_HOW_TO_READ, *_results(table)]
     for drawing in FIGURES:
         lines += [f"![{drawing.name}](figures/{drawing.name}.png)", ""]
+    if has_variants:
+        lines += ["## Variants of the setting", "", "![variants](figures/figure_8_variants.png)", ""]
     lines += ["## Each training", "", *_trainings(table)]
     lines += ["## In-sample and held out", "", _HELD_OUT, *_periods(held_out)]
     if len(sweep) > 1:
@@ -90,6 +95,7 @@ def _results(table: LevelTable) -> list[str]:
             cells = [_mean(level, digits) for level, digits in found]
             cells[0] = _with_interval(found[0][0])
             cells[1] += f" / {_mean(table.find(scenario, method, 'first_hit_agent'), 3)}"
+            cells[4] += _times(found[4][0], table.find(scenario, POTENTIAL_FIELD, "intrusion_share_of_steps"))
             lines.append(_row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells]))
     return [*lines, ""]
 
@@ -112,7 +118,7 @@ def _trainings(table: LevelTable) -> list[str]:
 def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
     tables = {name: LevelTable(rows=tuple(rows)) for name, rows in held_out.items()}
     heads = [f"{what}, {name}" for what in ("success", "share of steps within 1.2 m") for name in tables]
-    lines = [_row(["scenario", "controller", *heads, "agents"]), _row(["---"] * (len(heads) + 3))]
+    lines = [_row(["scenario", "controller", *heads, "agents x trainings"]), _row(["---"] * (len(heads) + 3))]
     for scenario in dict.fromkeys(s for table in tables.values() for s in table.scenarios):
         for method in METHODS:
             success = [table.find(scenario, method, "success") for table in tables.values()]
@@ -153,6 +159,13 @@ def _traceability(provenance: Mapping[str, Any]) -> list[str]:
 
 def _mean(level: Level | None, digits: int) -> str:
     return "-" if level is None or isnan(level.interval.mean) else f"{level.interval.mean:.{digits}f}"
+
+
+def _times(level: Level | None, reference: Level | None) -> str:
+    """How many times the reference, in brackets."""
+    if level is None or reference is None or level is reference or not reference.interval.mean > 0.0:
+        return ""
+    return f" (x {level.interval.mean / reference.interval.mean:.2f})"
 
 
 def _with_interval(level: Level | None) -> str:

@@ -23,6 +23,7 @@ from socialnav_mj.analysis.paired import HUMAN
 from socialnav_mj.analysis.panel import MIXED, make_panel
 from socialnav_mj.analysis.reward_map import draw_reward_maps
 from socialnav_mj.analysis.tables import Results, read_results
+from socialnav_mj.analysis.variant_figure import draw_variants
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
@@ -60,6 +61,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         ValueError: If the policies were trained on different parts of the recording.
     """
     results = {run.name: read_results(run_folder(out, run.name), n_jobs=n_jobs) for run in experiment.runs()}
+    titles = {variant.name: variant.title for variant in experiment.settings}
     tables: dict[str, LevelTable] = {}
     findings: dict[str, list[Finding]] = {}
     for variant in experiment.settings:
@@ -80,8 +82,9 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
     draw_figures(tables[DEFAULT.name], out / "figures")
     if len(sweep) > 1:
         draw_sweep(sweep, tables[DEFAULT.name], out / "figures")
+    if experiment.variants:
+        draw_variants(tables, titles, out / "figures")
     draw_reward_maps({f"training {k}": load_policy(p) for k, p in experiment.trainings.items()}, out / "figures")
-    titles = {variant.name: variant.title for variant in experiment.settings}
     write_whole(out / "claims.md", claims_page(findings, titles=titles, command=command).encode())
     provenance = {
         "command": command,
@@ -95,7 +98,12 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
     }
     write_whole(out / "provenance.json", (json.dumps(provenance, indent=1, sort_keys=True) + "\n").encode())
     page = experiment_page(
-        tables[DEFAULT.name], findings[DEFAULT.name], held_out=held_out, sweep=sweep, provenance=provenance
+        tables[DEFAULT.name],
+        findings[DEFAULT.name],
+        held_out=held_out,
+        sweep=sweep,
+        has_variants=experiment.variants,
+        provenance=provenance,
     )
     return write_whole(out / "README.md", page.encode())
 
