@@ -196,6 +196,33 @@ class Verify:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Draws:
+    """How many draws it takes to tell two controllers apart by a given difference, from the spread in a run."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
+    """Of `evaluate`, with two draws or more."""
+    measure: str = "success"
+    """A measure of summary.csv."""
+    difference: float = 0.05
+    """To be resolved at 95 %, in the measure's unit."""
+
+    def run(self) -> None:
+        """Print a table."""
+        import pyarrow.parquet
+
+        from socialnav_mj.analysis.draws import resolutions
+
+        agents = pyarrow.parquet.read_table(self.folder / "agents.parquet")
+        table = Table(title=f"draws that resolve {self.difference:g} of {self.measure} at 95 %", title_justify="left")
+        for heading in ("scenario", "controllers", "draws here", "spread", "for the interval", "for 80 % power"):
+            table.add_column(heading)
+        for r in resolutions(agents, {self.measure: self.difference}):
+            needed = (str(r.n_draws), f"{r.spread:.4f}", str(r.draws), str(r.draws_for_power))
+            table.add_row(r.scenario, " - ".join(r.controllers), *needed)
+        _console.print(table)
+
+
+@dataclass(frozen=True, kw_only=True)
 class List:
     """Show the tasks, controllers and recordings that there are."""
 
@@ -490,6 +517,7 @@ Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
+    | Annotated[Draws, tyro.conf.subcommand("draws")]
     | Annotated[List, tyro.conf.subcommand("list")]
     | Annotated[Data, tyro.conf.subcommand("data")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
