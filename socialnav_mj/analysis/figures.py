@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,6 +28,14 @@ from socialnav_mj.analysis.style import (
 )
 
 ROBOTS = (POTENTIAL_FIELD, REPLAY_IRL, MIXED)
+DOT: dict[str, Any] = {
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 3.2,
+    "color": "white",
+    "markeredgecolor": "black",
+}
+"""One training alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +192,7 @@ def _bar(axes: Axes, x: int, table: LevelTable, scenario: str, method: str, meas
         single = table.find(scenario, method, measure, training)
         if single is not None:
             place = x + 0.1 + 0.1 * k
-            axes.plot(place, single.interval.mean, marker="o", markersize=3.2, color="white", markeredgecolor="black")
+            axes.plot(place, single.interval.mean, zorder=6, **DOT)
 
 
 def _human_band(axes: Axes, level: Level | None) -> None:
@@ -193,7 +202,7 @@ def _human_band(axes: Axes, level: Level | None) -> None:
     axes.axhline(level.interval.mean, color="white", linewidth=2.4, zorder=4.5)
     axes.axhline(level.interval.mean, color=look.colour, linestyle=look.line, linewidth=1.2, zorder=5)
     if np.isfinite(level.interval.low):
-        axes.axhspan(level.interval.low, level.interval.high, color="#000000", alpha=0.12, linewidth=0.0, zorder=1)
+        axes.axhspan(level.interval.low, level.interval.high, color="#000000", alpha=0.12, linewidth=0.0, zorder=0.5)
 
 
 def _lines(table: LevelTable, drawing: Drawing) -> Figure:
@@ -251,7 +260,7 @@ def _legend(figure: Figure, *, bars: bool) -> None:
             marker = "" if bars else look.marker
             handles.append(Line2D([], [], color=look.colour, linestyle=look.line, marker=marker, label=look.label))
     if bars:
-        dot = Line2D([], [], linestyle="", marker="o", markersize=3.2, color="white", markeredgecolor="black")
+        dot = Line2D([], [], **DOT)
         dot.set_label("each training")
         handles.append(dot)
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
