@@ -1,8 +1,11 @@
 """Many episodes: a grid of scenarios, controllers and draws, in parallel, resumable, one file an episode."""
 
 import json
+import signal
+import threading
 import traceback
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -200,13 +203,31 @@ def _run_all(jobs: list[Job], folder: Path, n_jobs: int) -> Iterator[Done]:
             yield Done(job=job)
         else:
             waiting.append(job)
-    for done in Parallel(n_jobs=n_jobs, return_as="generator_unordered")(delayed(_run)(job, folder) for job in waiting):
+    with _deaf_to_interrupts():
+        # Processes start here and inherit it: Ctrl-C is this process's to handle, which then ends them.
+        results = Parallel(n_jobs=n_jobs, return_as="generator_unordered")(
+            delayed(_run)(job, folder) for job in waiting
+        )
+    for done in results:
         failed += done.error is not None
         yield done
     if failed:
         raise EvaluationError(
             f"{failed} of {len(jobs)} episodes failed, the others are kept; the same command runs the failed ones again"
         )
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C for a moment; signals can be set in the main thread alone."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
 
 
 def _run(job: Job, folder: Path) -> Done:
