@@ -44,6 +44,12 @@ def _print(text: str, console: Console = _console, style: str = "") -> None:
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
+def _counted_progress() -> Progress:
+    """A bar for work in equal pieces, with the time left."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    return Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=_errors)
+
+
 class _PaceColumn(ProgressColumn):
     """Simulated time per real time, and the time left."""
 
@@ -174,8 +180,7 @@ class Verify:
         from socialnav_mj.verification import files_of, verify
 
         total, wrong = len(files_of(self.path)), 0
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=_errors) as progress:
+        with _counted_progress() as progress:
             bar = progress.add_task("files", total=total)
             data_dir = None if self.data_dir is None else str(self.data_dir)
             for verdict in verify(self.path, dataset=self.dataset, data_dir=data_dir, n_jobs=self.jobs):
@@ -441,8 +446,7 @@ class Train:
         )
         label = "+".join(Path(name).stem for name in self.dataset)
         out = self.out or Path("runs") / "train" / f"{label}_{self.features}_seed{self.seed}"
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=_errors) as progress:
+        with _counted_progress() as progress:
             bar = progress.add_task("scene steps", total=config.scene_steps)
 
             def report(step: Step) -> None:

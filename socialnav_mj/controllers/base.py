@@ -16,7 +16,7 @@ Observation = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What the wheels can do; the task's `limits` property gives it to `Controller.reset`."""
+    """What the wheels can do; `Limits.of(task.scenario)` is what `Controller.reset` gets."""
 
     max_speed: float
     """Largest forward speed; the smallest is 0 [m/s]."""
