@@ -101,7 +101,9 @@ class Evaluate:
     scenarios: Scenarios = (1, 2, 3, 4)
     """Scenarios that replace 10, 30, 70, 90 % of the people."""
     controllers: tuple[str, ...] = ("potential_field", "go_straight")
-    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(attraction_limit=None)'."""
+    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(attraction_limit=None)'.
+    replay_irl and hybrid act with the shipped policy that learned from the recording, if there is one, else with
+    plaza's."""
     draws: int = 3
     """Random choices of the replaced people; 10 or more for figures to publish."""
     seed: int = 0
@@ -124,6 +126,7 @@ class Evaluate:
     def run(self) -> None:
         """Evaluate, then report."""
         from socialnav_mj.analysis.report import write_report
+        from socialnav_mj.controllers import with_policy_of
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
 
         names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
@@ -132,7 +135,7 @@ class Evaluate:
             variant=self.variant,
             data_dir=None if self.data_dir is None else str(self.data_dir),
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
-            controllers=self.controllers,
+            controllers=tuple(with_policy_of(spec, self.dataset) for spec in self.controllers),
             draws=self.draws,
             seed=self.seed,
             task_kwargs={name: getattr(self, name) for name in names},

@@ -14,7 +14,7 @@ from policies import random_tensors, write_policy
 from scenes import TINY
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.controllers import Limits, controller_config, make_controller
+from socialnav_mj.controllers import Limits, controller_config, make_controller, with_policy_of
 from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, PolicyError, ReplayIRL, load_policy, shipped_policies
 from socialnav_mj.environment import make_environment
 from socialnav_mj.features import FEATURE_SETS, running_state, view_of
@@ -44,6 +44,36 @@ def by_hand(tensors, network, state):
         if i < n_layers - 1:
             values = [max(v, 0.0) for v in values]
     return np.tanh(values)
+
+
+# Which policy
+
+
+OWN = "replay_irl(policy='students003_continuous_seed0')"
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("replay_irl", OWN),
+        ("hybrid", f"hybrid(near={OWN!r})"),
+        ("hybrid(switch_distance=1.0)", f"hybrid(switch_distance=1.0, near={OWN!r})"),
+        ("hybrid(near='go_straight', far='replay_irl')", f"hybrid(near='go_straight', far={OWN!r})"),
+        ("replay_irl(policy='students003_risk_seed0')", "replay_irl(policy='students003_risk_seed0')"),
+        ("hybrid(near='go_straight')", "hybrid(near='go_straight')"),
+        ("potential_field(attraction_limit=None)", "potential_field(attraction_limit=None)"),
+    ],
+)
+def test_learned_controllers_act_with_the_policy_of_the_recording(spec, expected):
+    found = with_policy_of(spec, "students003")
+    assert found == expected
+    assert make_controller(found).name == make_controller(expected).name
+
+
+@pytest.mark.parametrize("dataset", ["plaza", "zara01", "some/where/annotation.vsp"])
+def test_recordings_without_a_policy_of_their_own_get_the_default_one(dataset):
+    assert with_policy_of("hybrid", dataset) == "hybrid"
+    assert with_policy_of("replay_irl", dataset) == "replay_irl"
 
 
 # Forward pass

@@ -12,7 +12,7 @@ from socialnav_mj.controllers.base import Controller, Limits, Observation, Twist
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.potential_field import PotentialField
-from socialnav_mj.controllers.replay_irl import ReplayIRL
+from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, ReplayIRL, policy_of
 
 ENTRY_POINT_GROUP = "socialnav_mj.controllers"
 
@@ -60,6 +60,33 @@ def make_controller(spec: str) -> Controller:
     if not isinstance(controller, Controller):
         raise ValueError(f"controller {name!r} is a {type(controller).__name__}, which lacks name, reset or act")
     return controller
+
+
+def with_policy_of(spec: str, dataset: str) -> str:
+    """Let a learned controller act with the policy that learned from the recording it is to be judged on.
+
+    Args:
+        spec: As `make_controller` takes it.
+        dataset: Name of the recording.
+
+    Returns:
+        The spec with the recording's shipped policy wherever "replay_irl" stands without one; unchanged if it names its
+        policies, learns nothing, or no shipped policy learned from this recording alone.
+
+    Raises:
+        ValueError: If the spec cannot be read.
+    """
+    policy = policy_of(dataset)
+    name, config = _parse(spec)
+    found: dict[str, str] = {}
+    if name == "replay_irl" and "policy" not in config and policy != DEFAULT_POLICY:
+        found = {"policy": policy}
+    elif name == "hybrid":
+        parts = {part: config.get(part, getattr(Hybrid, part)) for part in ("near", "far")}
+        found = {part: own for part, old in parts.items() if (own := with_policy_of(old, dataset)) != old}
+    if not found:
+        return spec
+    return f"{name}({', '.join(f'{key}={value!r}' for key, value in (config | found).items())})"
 
 
 def controller_config(controller: Controller) -> dict[str, Any]:
@@ -156,4 +183,5 @@ __all__ = [
     "controller_config",
     "controller_of",
     "make_controller",
+    "with_policy_of",
 ]

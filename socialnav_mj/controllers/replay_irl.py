@@ -93,6 +93,19 @@ def shipped_policies() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in policies_folder().glob("*.safetensors")))
 
 
+def policy_of(dataset: str) -> str:
+    """The shipped policy that learned from a recording alone; of several training seeds the first.
+
+    Args:
+        dataset: Name of the recording.
+
+    Returns:
+        Its name; `DEFAULT_POLICY` if there is none.
+    """
+    name = f"{dataset}_continuous_seed0"
+    return name if name in shipped_policies() else DEFAULT_POLICY
+
+
 def policy_path(name_or_path: str) -> Path:
     """Where a policy's weights are.
 
