@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 
 from socialnav_mj.analysis.claims import COMPARABLE, Finding, Part, Verdict
+from socialnav_mj.analysis.markdown import head, row
 from socialnav_mj.analysis.two_way import Interval
 
 _RULE = f"""\
@@ -39,10 +40,10 @@ def claims_page(findings: Mapping[str, Sequence[Finding]], *, titles: Mapping[st
     names = list(findings)
     default = findings[names[0]]
     lines = ["# The paper's claims", "", f"Command: `{command}`", "", "## Verdicts", ""]
-    lines += [_row(["claim", "the paper says", *(titles[name] for name in names)]), _row(["---"] * (len(names) + 2))]
+    lines += head(["claim", "the paper says", *(titles[name] for name in names)])
     for place, finding in enumerate(default):
         verdicts = [_verdict(findings[name][place]) for name in names]
-        lines.append(_row([f"({finding.claim.key})", finding.claim.sentence, *verdicts]))
+        lines.append(row([f"({finding.claim.key})", finding.claim.sentence, *verdicts]))
     lines += ["", "## How a verdict comes about", "", _RULE]
     for place, finding in enumerate(default):
         lines += _section(finding, {name: findings[name][place] for name in names[1:]}, titles)
@@ -53,24 +54,22 @@ def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[st
     claim = finding.claim
     lines = [f"## ({claim.key}) {claim.sentence}", "", f"Test: {claim.test} [{claim.unit}].", ""]
     lines += [f"Default setting: **{_verdict(finding)}**.", ""]
-    lines += [_row(["comparison", "effect", "95 % interval", "for the trainings at hand", "verdict", "draws"])]
-    lines += [_row(["---"] * 6)]
+    lines += head(["comparison", "effect", "95 % interval", "for the trainings at hand", "verdict", "draws"])
     for part, interval, verdict in finding.parts:
         given = _range(interval.low_given, interval.high_given)
         count = f"{interval.n_draws}" + (f" x {interval.n_trainings} trainings" if interval.n_trainings else "")
         cells = [part.label, f"{interval.mean:+.3f}", _range(interval.low, interval.high), given, verdict, count]
-        lines.append(_row(cells))
-    lines += [_row([label, "not run", "-", "-", "undecided", "0"]) for label in finding.missing] + [""]
+        lines.append(row(cells))
+    lines += [row([label, "not run", "-", "-", "undecided", "0"]) for label in finding.missing] + [""]
     if others:
-        lines += [_row(["variant", "verdict", "its weakest comparison", "effect", "95 % interval"])]
-        lines += [_row(["---"] * 5)]
+        lines += head(["variant", "verdict", "its weakest comparison", "effect", "95 % interval"])
         for name, other in others.items():
             if not other.parts:
-                lines.append(_row([titles[name], other.verdict, "none was run", "-", "-"]))
+                lines.append(row([titles[name], other.verdict, "none was run", "-", "-"]))
                 continue
             part, interval, _ = min(other.parts, key=_strength)
             effect = [f"{interval.mean:+.3f}", _range(interval.low, interval.high)]
-            lines.append(_row([titles[name], _verdict(other), part.label, *effect]))
+            lines.append(row([titles[name], _verdict(other), part.label, *effect]))
         lines.append("")
     return lines
 
@@ -89,7 +88,3 @@ def _verdict(finding: Finding) -> str:
 
 def _range(low: float, high: float) -> str:
     return "-" if isnan(low) else f"{low:+.3f} to {high:+.3f}"
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -8,6 +8,7 @@ from typing import Any
 from socialnav_mj.analysis.claims import Finding
 from socialnav_mj.analysis.figures import FIGURES
 from socialnav_mj.analysis.levels import Level, LevelTable
+from socialnav_mj.analysis.markdown import head, row
 from socialnav_mj.analysis.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
 from socialnav_mj.analysis.style import LOOKS, SCENARIO_TITLES
 
@@ -68,8 +69,8 @@ def experiment_page(
     recording = provenance["recording"]
     lines = [f"# The paper's experiment on {recording['name']} ({recording['variant']})", ""]
     lines += [f"Command: `{provenance['command']}`", "", "## Claims of the paper, default setting", ""]
-    lines += [_row(["claim", "the paper says", "verdict"]), _row(["---"] * 3)]
-    lines += [_row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**"]) for f in findings]
+    lines += head(["claim", "the paper says", "verdict"])
+    lines += [row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**"]) for f in findings]
     lines += ["", "Effects, intervals, variants and the rule: [claims.md](claims.md).", "", "## Results", ""]
     lines += [_HOW_TO_READ, *_results(table)]
     for drawing in FIGURES:
@@ -85,8 +86,7 @@ def experiment_page(
 
 
 def _results(table: LevelTable) -> list[str]:
-    lines = [_row(["scenario", "controller", "success", *(h for h, _, _ in _COLUMNS[1:])])]
-    lines += [_row(["---"] * (len(_COLUMNS) + 2))]
+    lines = head(["scenario", "controller", *(heading for heading, _, _ in _COLUMNS)])
     for scenario in table.scenarios:
         for method in METHODS:
             found = [(table.find(scenario, method, measure), digits) for _, measure, digits in _COLUMNS]
@@ -96,14 +96,13 @@ def _results(table: LevelTable) -> list[str]:
             cells[0] = _with_interval(found[0][0])
             cells[1] += f" / {_mean(table.find(scenario, method, 'first_hit_agent'), 3)}"
             cells[4] += _times(found[4][0], table.find(scenario, POTENTIAL_FIELD, "intrusion_share_of_steps"))
-            lines.append(_row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells]))
+            lines.append(row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells]))
     return [*lines, ""]
 
 
 def _trainings(table: LevelTable) -> list[str]:
     titles = [SCENARIO_TITLES.get(s, s) for s in table.scenarios]
-    lines = ["Success / share of steps within 1.2 m.", "", _row(["controller", "training", *titles])]
-    lines += [_row(["---"] * (len(titles) + 2))]
+    lines = ["Success / share of steps within 1.2 m.", "", *head(["controller", "training", *titles])]
     for method in METHODS:
         for training in table.trainings(method):
             cells = [
@@ -111,14 +110,14 @@ def _trainings(table: LevelTable) -> list[str]:
                 f"{_mean(table.find(s, method, 'intrusion_share_of_steps', training), 3)}"
                 for s in table.scenarios
             ]
-            lines.append(_row([LOOKS[method].label, str(training), *cells]))
+            lines.append(row([LOOKS[method].label, str(training), *cells]))
     return [*lines, ""]
 
 
 def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
     tables = {name: LevelTable(rows=tuple(rows)) for name, rows in held_out.items()}
     heads = [f"{what}, {name}" for what in ("success", "share of steps within 1.2 m") for name in tables]
-    lines = [_row(["scenario", "controller", *heads, "agents x trainings"]), _row(["---"] * (len(heads) + 3))]
+    lines = head(["scenario", "controller", *heads, "agents x trainings"])
     for scenario in dict.fromkeys(s for table in tables.values() for s in table.scenarios):
         for method in METHODS:
             success = [table.find(scenario, method, "success") for table in tables.values()]
@@ -127,19 +126,18 @@ def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
                 continue
             counts = " / ".join("0" if level is None else str(level.n_values) for level in success)
             cells = [_with_interval(level) for level in (*success, *shares)]
-            lines.append(_row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells, counts]))
+            lines.append(row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells, counts]))
     return [*lines, ""]
 
 
 def _swept(sweep: Mapping[float, LevelTable]) -> list[str]:
     scenarios = next(iter(sweep.values())).scenarios
     lines = ["Mixed policy: success / share of steps within 1.2 m / time under way [s].", ""]
-    lines += [_row(["distance [m]", *(SCENARIO_TITLES.get(s, s) for s in scenarios)])]
-    lines += [_row(["---"] * (len(scenarios) + 1))]
+    lines += head(["distance [m]", *(SCENARIO_TITLES.get(s, s) for s in scenarios)])
     measures = (("success", 3), ("intrusion_share_of_steps", 3), ("time_under_way", 1))
     for distance, table in sweep.items():
         cells = [" / ".join(_mean(table.find(s, MIXED, m), digits) for m, digits in measures) for s in scenarios]
-        lines.append(_row([f"{distance:g}", *cells]))
+        lines.append(row([f"{distance:g}", *cells]))
     return [*lines, ""]
 
 
@@ -172,7 +170,3 @@ def _with_interval(level: Level | None) -> str:
     if level is None or isnan(level.interval.low):
         return _mean(level, 3)
     return f"{_mean(level, 3)} ({level.interval.low:.3f} to {level.interval.high:.3f})"
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -18,6 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from socialnav_mj.analysis.draws import resolutions
+from socialnav_mj.analysis.markdown import head, row
 from socialnav_mj.analysis.paired import paired_differences
 from socialnav_mj.analysis.paired_figure import paired_figure
 from socialnav_mj.analysis.sections import draws_section, fault_section, paired_section, severity_section
@@ -150,9 +151,9 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
         table.add_column("controller", overflow="fold")
         for heading, _, _ in _TERMINAL_COLUMNS:
             table.add_column(Text(heading), justify="right")
-        for controller, row in rows:
-            means = [f"{row[measure].mean:.{digits}f}" for _, measure, digits in _TERMINAL_COLUMNS[1:]]
-            table.add_row(Text(controller), _cell(row["success"], _TERMINAL_COLUMNS[0][2]), *means)
+        for controller, own in rows:
+            means = [f"{own[measure].mean:.{digits}f}" for _, measure, digits in _TERMINAL_COLUMNS[1:]]
+            table.add_row(Text(controller), _cell(own["success"], _TERMINAL_COLUMNS[0][2]), *means)
         tables.append(table)
     return tables
 
@@ -241,11 +242,11 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: 
             if (g["dataset"], g["variant"], g["scenario"]) == (dataset, variant, scenario)
         )
         lines += [f"## {dataset} ({variant}), {scenario}: {100 * share:g} % of the people replaced", ""]
-        lines += [_row([*headings, "draws", "agents"]), _row(["---"] * (len(headings) + 2))]
-        for controller, row in rows:
-            cells = [_cell(row[measure], digits) for _, measure, digits in _COLUMNS]
-            counts = [str(row["success"].n_draws), str(row["success"].n_agents)]
-            lines.append(_row([controller, cells[0], _interval(row["success"]), *cells[1:], *counts]))
+        lines += head([*headings, "draws", "agents"])
+        for controller, own in rows:
+            cells = [_cell(own[measure], digits) for _, measure, digits in _COLUMNS]
+            counts = [str(own["success"].n_draws), str(own["success"].n_agents)]
+            lines.append(row([controller, cells[0], _interval(own["success"]), *cells[1:], *counts]))
         lines.append("")
     lines += sections
     lines += ["## How to read it", "", _HOW_TO_READ, "## Traceability", "", "Recordings:", ""]
@@ -259,15 +260,11 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: 
         configurations[f"{group['scenario']} of {dataset}"] = group["scenario_configuration"]
         configurations[f"{group['controller']} on {dataset}"] = group["controller_configuration"]
     lines += [f"- {name}: `{json.dumps(value, sort_keys=True)}`" for name, value in sorted(configurations.items())]
-    lines += ["", "Episodes:", "", _row(["file", "draw", "state hash"]), _row(["---"] * 3)]
+    lines += ["", "Episodes:", "", *head(["file", "draw", "state hash"])]
     lines += [
-        _row([e["file"], str(e["draw"]), e["state_hash"]]) for group in summary["groups"] for e in group["episodes"]
+        row([e["file"], str(e["draw"]), e["state_hash"]]) for group in summary["groups"] for e in group["episodes"]
     ]
     return "\n".join(lines) + "\n"
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def _csv(estimates: Sequence[Estimate]) -> str:

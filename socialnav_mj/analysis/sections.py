@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from socialnav_mj.analysis.draws import Resolution
+from socialnav_mj.analysis.markdown import table
 from socialnav_mj.analysis.paired import DIFFERENCES
 from socialnav_mj.analysis.statistics import Columns, Estimate, groups
 from socialnav_mj.geometry import Array
@@ -76,7 +77,7 @@ def fault_section(agents: pa.Table, contacts: pa.Table, overlaps: dict[tuple[str
         cells = _fault_cells(own) if own is not None else ["0"] * 10
         share = float(np.mean(columns["struck_standing"].astype(float)))
         rows.append([_place(labels), labels["controller"], *cells, f"{share:.3f}"])
-    lines = ["## Who moved into whom", "", _FAULT, *_table(headings, rows)]
+    lines = ["## Who moved into whom", "", _FAULT, *table(headings, rows)]
     if overlaps:
         shares = "; ".join(f"{_place_of(*place)}: {np.mean(values):.3f}" for place, values in overlaps.items())
         lines += [f"{_OVERLAPS} {shares}.", ""]
@@ -107,7 +108,7 @@ def severity_section(contacts: pa.Table) -> list[str]:
         flesh = [str(int(np.sum(columns["flesh_severity"][hit] == name))) for name in classes[:3]]
         cells = [str(int(hit.sum())), *(f"{value:.2f}" for value in speed), impulse, *simulated, *flesh]
         rows.append([_place(labels), labels["controller"], *cells])
-    return ["## How hard", "", _SEVERITY, *_table(headings, rows)] if rows else []
+    return ["## How hard", "", _SEVERITY, *table(headings, rows)] if rows else []
 
 
 def paired_section(differences: Sequence[Estimate], figure: str) -> list[str]:
@@ -129,7 +130,7 @@ def paired_section(differences: Sequence[Estimate], figure: str) -> list[str]:
         cells = [_difference(row[name], _DIFFERENCES[name][1]) for name in DIFFERENCES]
         rows.append([_place_of(*key[:3]), key[3], *cells, str(row["time"].n_agents), str(row["time"].n_draws)])
     picture = f"![Differences between agents and the people they replaced]({figure})"
-    return ["## Beside the people they replaced", "", _PAIRED, picture, "", *_table(headings, rows)]
+    return ["## Beside the people they replaced", "", _PAIRED, picture, "", *table(headings, rows)]
 
 
 def draws_section(found: Iterable[Resolution]) -> list[str]:
@@ -149,7 +150,7 @@ def draws_section(found: Iterable[Resolution]) -> list[str]:
         cells = [f"{r.draws} / {r.draws_for_power} ({r.spread:.3f})" for r in row.values()]
         rows.append([_place_of(*key[:3]), " - ".join(key[3]), *cells, str(min(r.n_draws for r in row.values()))])
     headings = ["scenario", "controllers", *columns.values(), "from draws"]
-    return ["## How many draws it takes", "", _DRAWS, *_table(headings, rows)] if rows else []
+    return ["## How many draws it takes", "", _DRAWS, *table(headings, rows)] if rows else []
 
 
 def _fault_cells(columns: Columns) -> list[str]:
@@ -180,8 +181,3 @@ def _place(labels: dict[str, str]) -> str:
 
 def _place_of(dataset: str, variant: str, scenario: str) -> str:
     return f"{dataset} ({variant}), {scenario}"
-
-
-def _table(headings: Sequence[str], rows: Rows) -> list[str]:
-    listed = [headings, ["---"] * len(headings), *rows]
-    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in listed] + [""]
