@@ -499,8 +499,10 @@ class Reproduce:
 
     def run(self) -> None:
         """Run, then draw and write."""
-        from socialnav_mj.reproduction.outputs import publish, write_outputs
-        from socialnav_mj.reproduction.plan import Experiment, reproduce, shipped_for
+        from socialnav_mj.reproduction.outputs import PUBLIC, write_outputs
+        from socialnav_mj.reproduction.plan import Experiment, shipped_for
+        from socialnav_mj.reproduction.record import publish
+        from socialnav_mj.reproduction.study import reproduce
 
         experiment = Experiment(
             dataset=self.dataset,
@@ -517,7 +519,7 @@ class Reproduce:
             page = write_outputs(experiment, self.out, command=command, n_jobs=self.jobs)
         _print(f"report: {page}\nclaims: {self.out / 'claims.md'}")
         if self.publish is not None:
-            _print(f"to be committed: {publish(self.out, self.publish)}")
+            _print(f"to be committed: {publish(self.out, self.publish, PUBLIC)}")
 
 
 Command = (

@@ -16,8 +16,10 @@ from socialnav_mj.analysis.tables import Results
 from socialnav_mj.cli import main
 from socialnav_mj.controllers import make_controller
 from socialnav_mj.episode import EpisodeError
-from socialnav_mj.reproduction.outputs import agents_of, publish, write_outputs
-from socialnav_mj.reproduction.plan import DEFAULT, SWEEP, VARIANTS, Experiment, reproduce, run_folder, shipped_for
+from socialnav_mj.reproduction.outputs import PUBLIC, agents_of, write_outputs
+from socialnav_mj.reproduction.plan import DEFAULT, SWEEP, VARIANTS, Experiment, shipped_for
+from socialnav_mj.reproduction.record import publish
+from socialnav_mj.reproduction.study import reproduce, run_folder
 
 TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
 
@@ -165,4 +167,4 @@ def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(expe
 
 def test_publishing_needs_outputs(tmp_path):
     with pytest.raises(FileNotFoundError):
-        publish(tmp_path / "nothing", tmp_path / "results")
+        publish(tmp_path / "nothing", tmp_path / "results", PUBLIC)

@@ -1,10 +1,5 @@
 """Episodes of the experiment -> tables, figures, claims.md and README.md; all made again at every call."""
 
-import csv
-import hashlib
-import io
-import json
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -22,7 +17,7 @@ from socialnav_mj.analysis.levels import Level, LevelTable, levels
 from socialnav_mj.analysis.paired import HUMAN
 from socialnav_mj.analysis.panel import MIXED, make_panel
 from socialnav_mj.analysis.reward_map import draw_reward_maps
-from socialnav_mj.analysis.tables import Results, read_results
+from socialnav_mj.analysis.tables import Results
 from socialnav_mj.analysis.variant_figure import draw_variants
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_whole
@@ -34,9 +29,9 @@ from socialnav_mj.reproduction.plan import (
     SWITCH_DISTANCE,
     Experiment,
     Variant,
-    policy_checksum,
-    run_folder,
 )
+from socialnav_mj.reproduction.record import provenance_of, write_csv, write_json
+from socialnav_mj.reproduction.study import read_runs
 from socialnav_mj.rollout import recording_metadata
 
 PUBLIC = ("README.md", "claims.md", "provenance.json", "tables", "figures")
@@ -47,7 +42,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
     """Make everything in the experiment's folder again, except its episodes.
 
     Args:
-        experiment: That was run by `plan.reproduce`.
+        experiment: That was run by `study.reproduce`.
         out: Its folder; gets tables/, figures/, claims.md, README.md and provenance.json.
         command: That made it.
         n_jobs: Processes that score episodes.
@@ -60,7 +55,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         EpisodeError: If an episode is damaged or does not fit the others.
         ValueError: If the policies were trained on different parts of the recording.
     """
-    results = {run.name: read_results(run_folder(out, run.name), n_jobs=n_jobs) for run in experiment.runs()}
+    results = read_runs(experiment, out, n_jobs=n_jobs)
     titles = {variant.name: variant.title for variant in experiment.settings}
     tables: dict[str, LevelTable] = {}
     findings: dict[str, list[Finding]] = {}
@@ -70,15 +65,14 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         findings[variant.name] = examine(panel)
     sweep = _sweep(experiment, results, tables[DEFAULT.name])
     recording = load_recording(experiment.dataset, data_dir=experiment.data_dir)
-    cards = {seed: load_policy(policy).card for seed, policy in experiment.trainings.items()}
-    periods = period_of_people(recording, [card["config"] for card in cards.values()])
+    periods = period_of_people(recording, [load_policy(policy).card["config"] for policy in experiment.policies])
     held_out = held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods)
 
-    _write_csv(out / "tables" / "levels.csv", [r for name, t in tables.items() for r in _rows(t.rows, variant=name)])
-    _write_csv(out / "tables" / "claims.csv", [row for name, f in findings.items() for row in _claim_rows(name, f)])
-    _write_csv(out / "tables" / "held_out.csv", [r for name, t in held_out.items() for r in _rows(t, period=name)])
+    write_csv(out / "tables" / "levels.csv", [r for name, t in tables.items() for r in _rows(t.rows, variant=name)])
+    write_csv(out / "tables" / "claims.csv", [row for name, f in findings.items() for row in _claim_rows(name, f)])
+    write_csv(out / "tables" / "held_out.csv", [r for name, t in held_out.items() for r in _rows(t, period=name)])
     swept = [r for d, t in sweep.items() for r in _rows([x for x in t.rows if x.method == MIXED], switch_distance=d)]
-    _write_csv(out / "tables" / "switch_distance.csv", swept)
+    write_csv(out / "tables" / "switch_distance.csv", swept)
     draw_figures(tables[DEFAULT.name], out / "figures")
     if len(sweep) > 1:
         draw_sweep(sweep, tables[DEFAULT.name], out / "figures")
@@ -86,17 +80,9 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         draw_variants(tables, titles, out / "figures")
     draw_reward_maps({f"training {k}": load_policy(p) for k, p in experiment.trainings.items()}, out / "figures")
     write_whole(out / "claims.md", claims_page(findings, titles=titles, command=command).encode())
-    provenance = {
-        "command": command,
-        "experiment": {k: v for k, v in asdict(experiment).items() if k != "data_dir"},
-        "recording": recording_metadata(recording),
-        "policies": {
-            policy: {"training_seed": seed, "sha256": policy_checksum(policy), "card": cards[seed]}
-            for seed, policy in experiment.trainings.items()
-        },
-        "runs": {name: _provenance(result) for name, result in results.items()},
-    }
-    write_whole(out / "provenance.json", (json.dumps(provenance, indent=1, sort_keys=True) + "\n").encode())
+    provenance = provenance_of(experiment, results, command=command)
+    provenance["recording"] = recording_metadata(recording)
+    write_json(out / "provenance.json", provenance)
     page = experiment_page(
         tables[DEFAULT.name],
         findings[DEFAULT.name],
@@ -127,29 +113,6 @@ def agents_of(experiment: Experiment, variant: Variant, results: Mapping[str, Re
     )
 
 
-def publish(out: Path, folder: Path) -> Path:
-    """Copy what may travel with the project.
-
-    Args:
-        out: Folder of an experiment.
-        folder: Where to; what is there of the same names is replaced.
-
-    Returns:
-        The folder.
-
-    Raises:
-        FileNotFoundError: If the experiment has no such outputs yet.
-    """
-    for name in PUBLIC:
-        source, target = out / name, folder / name
-        if source.is_dir():
-            shutil.rmtree(target, ignore_errors=True)
-            shutil.copytree(source, target)
-        else:
-            write_whole(target, source.read_bytes())
-    return folder
-
-
 def _sweep(experiment: Experiment, results: Mapping[str, Results], default: LevelTable) -> dict[float, LevelTable]:
     """Levels of the mixed policy by switch distance [m]."""
     found = {SWITCH_DISTANCE: default}
@@ -158,17 +121,6 @@ def _sweep(experiment: Experiment, results: Mapping[str, Results], default: Leve
             panel = make_panel(results[SWEEP_RUN].agents, experiment.sweep_roster(distance))
             found[distance] = LevelTable(rows=tuple(levels(panel)))
     return dict(sorted(found.items()))
-
-
-def _provenance(results: Results) -> dict[str, Any]:
-    hashes = sorted(f"{source.file} {source.metadata['state_hash']}" for source in results.sources)
-    versions = {json.dumps(source.metadata.get("versions", {}), sort_keys=True) for source in results.sources}
-    return {
-        "episodes": len(hashes),
-        "agents": results.agents.num_rows,
-        "sha256_of_state_hashes": hashlib.sha256("\n".join(hashes).encode()).hexdigest(),
-        "versions": [json.loads(version) for version in sorted(versions)],
-    }
 
 
 def _rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
@@ -201,16 +153,3 @@ def _claim_rows(variant: str, findings: Sequence[Finding]) -> list[dict[str, Any
         for finding in findings
         for part, interval, verdict in finding.parts
     ]
-
-
-def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({k: _text(v) if isinstance(v, float) else v for k, v in row.items()})
-    write_whole(path, text.getvalue().encode())
-
-
-def _text(value: float) -> str:
-    return "" if value != value else f"{value:.6g}"

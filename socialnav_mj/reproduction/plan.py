@@ -1,19 +1,16 @@
 """The paper's experiment: which controllers run in which settings."""
 
-import hashlib
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-import tasks
 from socialnav_mj.analysis.paired import HUMAN
 from socialnav_mj.analysis.panel import MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry
 from socialnav_mj.controllers.hybrid import Who
-from socialnav_mj.controllers.replay_irl import load_policy, policies_folder, shipped_policies
-from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
+from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
+from socialnav_mj.evaluation import Evaluation
+from socialnav_mj.reproduction.study import Run, Study, learned
 
 ROBOTS = (POTENTIAL_FIELD, REPLAY_IRL, MIXED)
 SWITCH_DISTANCE = 2.0
@@ -54,43 +51,25 @@ VARIANTS: tuple[Variant, ...] = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
-    """An evaluation of its own folder, and what its controllers are in the experiment."""
-
-    name: str
-    evaluation: Evaluation
-    roster: tuple[Entry, ...]
-    """One entry a controller, and the human row."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """What is to be reproduced."""
+class Experiment(Study):
+    """What is to be reproduced; of its policies there is one for each training seed."""
 
     dataset: str
     """Name in the catalogue, or path of a recording."""
-    policies: tuple[str, ...]
-    """Trained policies, as `load_policy` takes them, one for each training seed."""
-    data_dir: str | None = None
-    """Where recordings are looked for first."""
-    scenarios: tuple[str, ...] = tasks.ALL_TASKS
-    draws: int = 10
-    seed: int = 0
-    """Of the first draw."""
     variants: bool = False
     """Whether to run the variants and the sweep of the switch distance as well."""
 
     def __post_init__(self) -> None:
         if not self.policies:
             raise ValueError("policies = () is not allowed; allowed: one or more trained policies")
-        seeds = [training_seed(policy) for policy in self.policies]
+        seeds = [load_policy(policy).training_seed for policy in self.policies]
         if len(set(seeds)) < len(seeds):
             raise ValueError(f"policies {self.policies} have training seeds {seeds}; allowed: one of each")
 
     @cached_property
     def trainings(self) -> dict[int, str]:
         """Training seed: policy, ascending."""
-        return dict(sorted((training_seed(policy), policy) for policy in self.policies))
+        return dict(sorted((load_policy(policy).training_seed, policy) for policy in self.policies))
 
     @property
     def settings(self) -> tuple[Variant, ...]:
@@ -109,7 +88,7 @@ class Experiment:
         far = _potential_field(variant)
         return (
             Entry(controller=far, method=POTENTIAL_FIELD),
-            *(Entry(controller=_learned(p), method=REPLAY_IRL, training_seed=k) for k, p in self.trainings.items()),
+            *(Entry(controller=learned(p), method=REPLAY_IRL, training_seed=k) for k, p in self.trainings.items()),
             *self._mixed(far, SWITCH_DISTANCE, variant.who),
             Entry(controller=HUMAN, method=HUMAN),
         )
@@ -128,7 +107,7 @@ class Experiment:
     def _mixed(self, far: str, distance: float, who: Who) -> tuple[Entry, ...]:
         return tuple(
             Entry(
-                controller=f"hybrid(near={_learned(p)!r}, far={far!r}, switch_distance={distance!r}, who={who!r})",
+                controller=f"hybrid(near={learned(p)!r}, far={far!r}, switch_distance={distance!r}, who={who!r})",
                 method=MIXED,
                 training_seed=k,
             )
@@ -162,17 +141,9 @@ class Experiment:
         )
         return Run(name=name, evaluation=evaluation, roster=roster)
 
-    def jobs(self) -> list[Job]:
-        """Every episode of every run."""
-        return [job for run in self.runs() for job in jobs_of(run.evaluation)]
-
 
 def _potential_field(variant: Variant) -> str:
     return "potential_field" if variant.attraction_limit == 1.0 else "potential_field(attraction_limit=None)"
-
-
-def _learned(policy: str) -> str:
-    return f"replay_irl(policy={policy!r})"
 
 
 def shipped_for(dataset: str, features: str = "continuous") -> tuple[str, ...]:
@@ -196,78 +167,3 @@ def shipped_for(dataset: str, features: str = "continuous") -> tuple[str, ...]:
             f"{', '.join(shipped_policies()) or 'none'}; name the policies to take, or paths of .safetensors files"
         )
     return found
-
-
-def training_seed(policy: str) -> int:
-    """Training seed of a policy, by its card.
-
-    Args:
-        policy: As `load_policy` takes it.
-
-    Returns:
-        The seed.
-
-    Raises:
-        PolicyError: If there is no such policy.
-    """
-    return int(load_policy(policy).card["config"]["seed"])
-
-
-def policy_checksum(policy: str) -> str:
-    """sha256 of a policy's weights.
-
-    Args:
-        policy: As `load_policy` takes it.
-
-    Returns:
-        Hexadecimal digits.
-    """
-    path = Path(policy) if policy.endswith(".safetensors") else policies_folder() / f"{policy}.safetensors"
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def run_folder(out: Path, name: str) -> Path:
-    """Where the episodes of a run are.
-
-    Args:
-        out: Folder of the experiment.
-        name: Of the run.
-
-    Returns:
-        An evaluation's folder.
-    """
-    return out / "runs" / name
-
-
-def reproduce(experiment: Experiment, out: Path, *, command: str = "", n_jobs: int = -1) -> Iterator[Done]:
-    """Run what is not there yet; everything that can be wrong is told before anything runs.
-
-    Args:
-        experiment: What is to be run.
-        out: Gets `runs/NAME/episodes/*.npz`.
-        command: Kept beside the episodes.
-        n_jobs: Processes; -1 for one a core.
-
-    Returns:
-        A note of each episode. It raises `EvaluationError` after all others have run, if some could not be.
-
-    Raises:
-        FileNotFoundError: If the recording is not there.
-        EpisodeError: If an episode of the folder is damaged, or was run with another configuration.
-        ValueError: If the experiment asks for what does not exist or is not allowed.
-    """
-    started = [
-        evaluate(run.evaluation, run_folder(out, run.name), command=command, n_jobs=n_jobs) for run in experiment.runs()
-    ]
-    return _in_turn(started)
-
-
-def _in_turn(started: list[Iterator[Done]]) -> Iterator[Done]:
-    failures = []
-    for episodes in started:
-        try:
-            yield from episodes
-        except EvaluationError as error:
-            failures.append(str(error))
-    if failures:
-        raise EvaluationError("; ".join(failures))

@@ -1,0 +1,103 @@
+"""What a study leaves behind: tables, where they come from, and a copy of what may travel with the project."""
+
+import csv
+import hashlib
+import io
+import json
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from socialnav_mj.analysis.tables import Results
+from socialnav_mj.controllers.replay_irl import load_policy
+from socialnav_mj.files import write_whole
+from socialnav_mj.reproduction.study import Study
+
+
+def provenance_of(study: Study, results: Mapping[str, Results], *, command: str) -> dict[str, Any]:
+    """Where a study's figures come from.
+
+    Args:
+        study: That was run.
+        results: Of each run.
+        command: That made it.
+
+    Returns:
+        JSON values: command, experiment, policies with their cards, runs with the hash of their episodes' states.
+    """
+    trained = {policy: load_policy(policy) for policy in study.policies}
+    return {
+        "command": command,
+        "experiment": {k: v for k, v in asdict(study).items() if k != "data_dir"},
+        "policies": {
+            name: {"training_seed": policy.training_seed, "sha256": policy.checksum, "card": policy.card}
+            for name, policy in sorted(trained.items(), key=lambda item: item[1].training_seed)
+        },
+        "runs": {name: _run_facts(result) for name, result in results.items()},
+    }
+
+
+def _run_facts(results: Results) -> dict[str, Any]:
+    hashes = sorted(f"{source.file} {source.metadata['state_hash']}" for source in results.sources)
+    versions = {json.dumps(source.metadata.get("versions", {}), sort_keys=True) for source in results.sources}
+    return {
+        "episodes": len(hashes),
+        "agents": results.agents.num_rows,
+        "sha256_of_state_hashes": hashlib.sha256("\n".join(hashes).encode()).hexdigest(),
+        "versions": [json.loads(version) for version in sorted(versions)],
+    }
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write JSON, equal bytes for equal content.
+
+    Args:
+        path: Target.
+        content: JSON values.
+    """
+    write_whole(path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write a table; numbers with six digits, NaN as nothing.
+
+    Args:
+        path: Target.
+        rows: All with the columns of the first.
+    """
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({k: _text(v) if isinstance(v, float) else v for k, v in row.items()})
+    write_whole(path, text.getvalue().encode())
+
+
+def _text(value: float) -> str:
+    return "" if value != value else f"{value:.6g}"
+
+
+def publish(out: Path, folder: Path, names: Iterable[str]) -> Path:
+    """Copy what may travel with the project.
+
+    Args:
+        out: Folder of a study.
+        folder: Where to; what is there of the same names is replaced.
+        names: Files and folders to copy.
+
+    Returns:
+        The folder.
+
+    Raises:
+        FileNotFoundError: If the study has no such outputs yet.
+    """
+    for name in names:
+        source, target = out / name, folder / name
+        if source.is_dir():
+            shutil.rmtree(target, ignore_errors=True)
+            shutil.copytree(source, target)
+        else:
+            write_whole(target, source.read_bytes())
+    return folder
