@@ -239,5 +239,6 @@ def test_people_are_held_out_who_appear_after_training_and_validation():
     periods = period_of_people(crowd(), [card, dict(card)])
     assert periods == {1: IN_SAMPLE, 2: IN_SAMPLE, 3: VALIDATION, 4: HELD_OUT, 5: HELD_OUT}
     assert set(period_of_people(crowd(), [card | {"datasets": ["zara01"]}]).values()) == {HELD_OUT}
+    assert period_of_people(crowd(), [card | {"datasets": ["zara01", f"some/folder/{crowd().name}.txt"]}]) == periods
     with pytest.raises(ValueError, match="different parts of made"):
         period_of_people(crowd(), [card, card | {"train_window": [0.0, 0.5]}])

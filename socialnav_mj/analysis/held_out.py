@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,18 @@ from socialnav_mj.recordings import Recording
 IN_SAMPLE, VALIDATION, HELD_OUT = "in-sample", "validation", "held out"
 PERIODS = (IN_SAMPLE, VALIDATION, HELD_OUT)
 HELD_OUT_MEASURES = ("success", "intrusion_share_of_steps")
+
+
+def learned_from(configuration: Mapping[str, Any]) -> tuple[str, ...]:
+    """Recordings that a policy learned from.
+
+    Args:
+        configuration: Of the training (`datasets`: names in the catalogue, or paths).
+
+    Returns:
+        Their names, as a loaded recording has them: of a path the file's name without its ending.
+    """
+    return tuple(Path(dataset).stem for dataset in configuration["datasets"])
 
 
 def period_of_people(recording: Recording, configurations: Sequence[Mapping[str, Any]]) -> dict[int, str]:
@@ -31,7 +44,7 @@ def period_of_people(recording: Recording, configurations: Sequence[Mapping[str,
         ValueError: If the trainings used different parts of the recording, so that the periods differ.
     """
     windows = {
-        (tuple(c["train_window"]), tuple(c["validation_window"])) if recording.name in c["datasets"] else None
+        (tuple(c["train_window"]), tuple(c["validation_window"])) if recording.name in learned_from(c) else None
         for c in configurations
     }
     if len(windows) > 1:
