@@ -1,14 +1,12 @@
 """README.md of an experiment: the verdicts, the main table, the figures, and where it all comes from."""
 
-import json
 from collections.abc import Mapping, Sequence
-from math import isnan
 from typing import Any
 
 from socialnav_mj.analysis.claims import Finding
 from socialnav_mj.analysis.figures import FIGURES
 from socialnav_mj.analysis.levels import Level, LevelTable
-from socialnav_mj.analysis.markdown import head, row
+from socialnav_mj.analysis.markdown import head, interval_cell, mean_cell, row, traceability
 from socialnav_mj.analysis.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
 from socialnav_mj.analysis.style import LOOKS, SCENARIO_TITLES
 
@@ -82,7 +80,7 @@ def experiment_page(
     if len(sweep) > 1:
         lines += ["## Switch distance", "", *_swept(sweep), "![sweep](figures/figure_6_switch_distance.png)", ""]
     lines += ["## What the reward learned", "", _REWARD, "![reward](figures/figure_7_learned_reward.png)", ""]
-    return "\n".join([*lines, *_traceability(provenance)]) + "\n"
+    return "\n".join([*lines, *traceability(provenance, [recording])]) + "\n"
 
 
 def _results(table: LevelTable) -> list[str]:
@@ -92,9 +90,9 @@ def _results(table: LevelTable) -> list[str]:
             found = [(table.find(scenario, method, measure), digits) for _, measure, digits in _COLUMNS]
             if found[0][0] is None:
                 continue
-            cells = [_mean(level, digits) for level, digits in found]
-            cells[0] = _with_interval(found[0][0])
-            cells[1] += f" / {_mean(table.find(scenario, method, 'first_hit_agent'), 3)}"
+            cells = [mean_cell(level, digits) for level, digits in found]
+            cells[0] = interval_cell(found[0][0])
+            cells[1] += f" / {mean_cell(table.find(scenario, method, 'first_hit_agent'), 3)}"
             cells[4] += _times(found[4][0], table.find(scenario, POTENTIAL_FIELD, "intrusion_share_of_steps"))
             lines.append(row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells]))
     return [*lines, ""]
@@ -106,8 +104,8 @@ def _trainings(table: LevelTable) -> list[str]:
     for method in METHODS:
         for training in table.trainings(method):
             cells = [
-                f"{_mean(table.find(s, method, 'success', training), 3)} / "
-                f"{_mean(table.find(s, method, 'intrusion_share_of_steps', training), 3)}"
+                f"{mean_cell(table.find(s, method, 'success', training), 3)} / "
+                f"{mean_cell(table.find(s, method, 'intrusion_share_of_steps', training), 3)}"
                 for s in table.scenarios
             ]
             lines.append(row([LOOKS[method].label, str(training), *cells]))
@@ -125,7 +123,7 @@ def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
             if all(level is None for level in success):
                 continue
             counts = " / ".join("0" if level is None else str(level.n_values) for level in success)
-            cells = [_with_interval(level) for level in (*success, *shares)]
+            cells = [interval_cell(level) for level in (*success, *shares)]
             lines.append(row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells, counts]))
     return [*lines, ""]
 
@@ -136,27 +134,9 @@ def _swept(sweep: Mapping[float, LevelTable]) -> list[str]:
     lines += head(["distance [m]", *(SCENARIO_TITLES.get(s, s) for s in scenarios)])
     measures = (("success", 3), ("intrusion_share_of_steps", 3), ("time_under_way", 1))
     for distance, table in sweep.items():
-        cells = [" / ".join(_mean(table.find(s, MIXED, m), digits) for m, digits in measures) for s in scenarios]
+        cells = [" / ".join(mean_cell(table.find(s, MIXED, m), digits) for m, digits in measures) for s in scenarios]
         lines.append(row([f"{distance:g}", *cells]))
     return [*lines, ""]
-
-
-def _traceability(provenance: Mapping[str, Any]) -> list[str]:
-    recording = provenance["recording"]
-    lines = ["## Traceability", "", f"- experiment: `{json.dumps(provenance['experiment'], sort_keys=True)}`"]
-    lines += [f"- recording: {recording['name']}, variant {recording['variant']}, checksum {recording['checksum']}"]
-    for policy, facts in provenance["policies"].items():
-        lines += [f"- policy {policy}: training seed {facts['training_seed']}, sha256 {facts['sha256']}"]
-    for name, run in provenance["runs"].items():
-        count = f"{run['episodes']} episodes, {run['agents']} agents"
-        lines += [f"- run {name}: {count}, sha256 of its state hashes {run['sha256_of_state_hashes']}"]
-    versions = {json.dumps(v, sort_keys=True) for run in provenance["runs"].values() for v in run["versions"]}
-    lines += [f"- versions: {', '.join(f'{k} {v}' for k, v in json.loads(text).items())}" for text in sorted(versions)]
-    return [*lines, "- everything, with the policies' cards: provenance.json"]
-
-
-def _mean(level: Level | None, digits: int) -> str:
-    return "-" if level is None or isnan(level.interval.mean) else f"{level.interval.mean:.{digits}f}"
 
 
 def _times(level: Level | None, reference: Level | None) -> str:
@@ -164,9 +144,3 @@ def _times(level: Level | None, reference: Level | None) -> str:
     if level is None or reference is None or level is reference or not reference.interval.mean > 0.0:
         return ""
     return f" (x {level.interval.mean / reference.interval.mean:.2f})"
-
-
-def _with_interval(level: Level | None) -> str:
-    if level is None or isnan(level.interval.low):
-        return _mean(level, 3)
-    return f"{_mean(level, 3)} ({level.interval.low:.3f} to {level.interval.high:.3f})"

@@ -48,12 +48,19 @@ class Level:
     """Agents with a value, added up over the trainings."""
 
 
-def levels(panel: Panel, measures: Sequence[str] = LEVEL_MEASURES, *, each_training: bool = True) -> list[Level]:
+def levels(
+    panel: Panel,
+    measures: Sequence[str] = LEVEL_MEASURES,
+    *,
+    methods: Sequence[str] = METHODS,
+    each_training: bool = True,
+) -> list[Level]:
     """Means of all methods.
 
     Args:
         panel: Of the experiment.
         measures: Of `LEVEL_MEASURES`.
+        methods: What is compared; those that the panel lacks are left out.
         each_training: Whether to add a row for each training of the methods that learn.
 
     Returns:
@@ -61,7 +68,7 @@ def levels(panel: Panel, measures: Sequence[str] = LEVEL_MEASURES, *, each_train
     """
     result = []
     for scenario in panel.scenarios:
-        for method in METHODS:
+        for method in methods:
             if not panel.has(method, scenario):
                 continue
             trained = panel.is_trained(method)

@@ -13,7 +13,7 @@ from socialnav_mj.analysis.claims_page import claims_page
 from socialnav_mj.analysis.experiment_page import experiment_page
 from socialnav_mj.analysis.figures import draw_figures, draw_sweep
 from socialnav_mj.analysis.held_out import held_out_levels, period_of_people
-from socialnav_mj.analysis.levels import Level, LevelTable, levels
+from socialnav_mj.analysis.levels import LevelTable, levels
 from socialnav_mj.analysis.paired import HUMAN
 from socialnav_mj.analysis.panel import MIXED, make_panel
 from socialnav_mj.analysis.reward_map import draw_reward_maps
@@ -30,7 +30,7 @@ from socialnav_mj.reproduction.plan import (
     Experiment,
     Variant,
 )
-from socialnav_mj.reproduction.record import provenance_of, write_csv, write_json
+from socialnav_mj.reproduction.record import level_rows, provenance_of, write_csv, write_json
 from socialnav_mj.reproduction.study import read_runs
 from socialnav_mj.rollout import recording_metadata
 
@@ -68,10 +68,14 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
     periods = period_of_people(recording, [load_policy(policy).card["config"] for policy in experiment.policies])
     held_out = held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods)
 
-    write_csv(out / "tables" / "levels.csv", [r for name, t in tables.items() for r in _rows(t.rows, variant=name)])
+    write_csv(
+        out / "tables" / "levels.csv", [r for name, t in tables.items() for r in level_rows(t.rows, variant=name)]
+    )
     write_csv(out / "tables" / "claims.csv", [row for name, f in findings.items() for row in _claim_rows(name, f)])
-    write_csv(out / "tables" / "held_out.csv", [r for name, t in held_out.items() for r in _rows(t, period=name)])
-    swept = [r for d, t in sweep.items() for r in _rows([x for x in t.rows if x.method == MIXED], switch_distance=d)]
+    write_csv(out / "tables" / "held_out.csv", [r for name, t in held_out.items() for r in level_rows(t, period=name)])
+    swept = [
+        r for d, t in sweep.items() for r in level_rows([x for x in t.rows if x.method == MIXED], switch_distance=d)
+    ]
     write_csv(out / "tables" / "switch_distance.csv", swept)
     draw_figures(tables[DEFAULT.name], out / "figures")
     if len(sweep) > 1:
@@ -121,21 +125,6 @@ def _sweep(experiment: Experiment, results: Mapping[str, Results], default: Leve
             panel = make_panel(results[SWEEP_RUN].agents, experiment.sweep_roster(distance))
             found[distance] = LevelTable(rows=tuple(levels(panel)))
     return dict(sorted(found.items()))
-
-
-def _rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
-    return [
-        {
-            **labels,
-            "scenario": level.scenario,
-            "method": level.method,
-            "training": "all" if level.training is None else level.training,
-            "measure": level.measure,
-            **asdict(level.interval),
-            "n_values": level.n_values,
-        }
-        for level in found
-    ]
 
 
 def _claim_rows(variant: str, findings: Sequence[Finding]) -> list[dict[str, Any]]:

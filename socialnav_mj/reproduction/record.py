@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from socialnav_mj.analysis.levels import Level
 from socialnav_mj.analysis.tables import Results
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_whole
@@ -48,6 +49,30 @@ def _run_facts(results: Results) -> dict[str, Any]:
         "sha256_of_state_hashes": hashlib.sha256("\n".join(hashes).encode()).hexdigest(),
         "versions": [json.loads(version) for version in sorted(versions)],
     }
+
+
+def level_rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
+    """Levels as rows of a table.
+
+    Args:
+        found: The levels.
+        **labels: Columns that stand before them.
+
+    Returns:
+        Column: value, of each level.
+    """
+    return [
+        {
+            **labels,
+            "scenario": level.scenario,
+            "method": level.method,
+            "training": "all" if level.training is None else level.training,
+            "measure": level.measure,
+            **asdict(level.interval),
+            "n_values": level.n_values,
+        }
+        for level in found
+    ]
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
