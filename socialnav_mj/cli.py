@@ -522,6 +522,58 @@ class Reproduce:
             _print(f"to be committed: {publish(self.out, self.publish, PUBLIC)}")
 
 
+@dataclass(frozen=True, kw_only=True)
+class LeaveOneOut:
+    """Run policies that learned from all recordings but one on each recording: in-sample and held out side by side.
+
+    Writes tables over the agents that replace people whom the in-sample policies learned from. Run again after an
+    interruption, the same command goes on where it was.
+    """
+
+    recordings: tuple[str, ...] = ("students003", "zara01", "zara02")
+    """Names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    policies: tuple[str, ...] = ()
+    """Names of shipped policies, or paths of .safetensors files; those that left one recording out by default."""
+    features: Literal["continuous", "risk"] = "continuous"
+    """Feature set of the shipped policies to take."""
+    scenarios: Scenarios = (1, 2)
+    """Scenarios to run."""
+    draws: int = 10
+    """Random choices of the replaced people."""
+    seed: int = 0
+    """Seed of the first draw."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path = Path("leave_one_out")
+    """Folder of the results."""
+    publish: Folder = None
+    """Folder that gets a copy of tables and page: all that holds no recording and no episode."""
+
+    def run(self) -> None:
+        """Run, then write."""
+        from socialnav_mj.reproduction import leave_one_out
+        from socialnav_mj.reproduction.record import publish
+        from socialnav_mj.reproduction.study import reproduce
+
+        study = leave_one_out.LeaveOneOut(
+            recordings=self.recordings,
+            policies=self.policies or leave_one_out.shipped_leaving_one_out(self.recordings, self.features),
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            draws=self.draws,
+            seed=self.seed,
+        )
+        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
+        _follow(reproduce(study, self.out, command=command, n_jobs=self.jobs), study.jobs())
+        with _errors.status("tables"):
+            page = leave_one_out.write_leave_one_out(study, self.out, command=command, n_jobs=self.jobs)
+        _print(f"report: {page}")
+        if self.publish is not None:
+            _print(f"to be committed: {publish(self.out, self.publish, leave_one_out.PUBLIC)}")
+
+
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
@@ -532,6 +584,7 @@ Command = (
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
 )
 
 

@@ -1,7 +1,7 @@
 """Policies simple enough to be known by heart: one layer, in the files that trained ones come in."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,13 @@ from socialnav_mj.geometry import Array
 
 
 def write_toy(
-    folder: Path, name: str, *, seed: int, reward: Callable[[Array], None] | None = None, dataset: str = "tiny"
+    folder: Path,
+    name: str,
+    *,
+    seed: int,
+    reward: Callable[[Array], None] | None = None,
+    datasets: Sequence[str] = ("tiny",),
+    train_end: float = 0.6,
 ) -> str:
     """A policy that turns to its goal at speed, a little differently for each seed.
 
@@ -21,7 +27,8 @@ def write_toy(
         name: Of the policy.
         seed: Training seed in its card.
         reward: Fills the reward network's weights, shape (1, size + 2), in place; zeros by default.
-        dataset: In its card.
+        datasets: In its card.
+        train_end: End of the part that it learned from, in its card; a tenth for validation follows.
 
     Returns:
         Path of the policy.
@@ -41,9 +48,9 @@ def write_toy(
     config = {
         "features": "continuous",
         "seed": seed,
-        "datasets": [dataset],
-        "train_window": [0.0, 0.6],
-        "validation_window": [0.6, 0.7],
+        "datasets": list(datasets),
+        "train_window": [0.0, train_end],
+        "validation_window": [train_end, train_end + 0.1],
     }
     (folder / f"{name}.json").write_text(json.dumps({"config": config}))
     return str(folder / f"{name}.safetensors")

@@ -17,6 +17,18 @@ PERIODS = (IN_SAMPLE, VALIDATION, HELD_OUT)
 HELD_OUT_MEASURES = ("success", "intrusion_share_of_steps")
 
 
+def recording_name(dataset: str) -> str:
+    """Name that a recording has when it is loaded.
+
+    Args:
+        dataset: Its name in the catalogue, or its path.
+
+    Returns:
+        Of a path the file's name without its ending.
+    """
+    return Path(dataset).stem
+
+
 def learned_from(configuration: Mapping[str, Any]) -> tuple[str, ...]:
     """Recordings that a policy learned from.
 
@@ -24,9 +36,9 @@ def learned_from(configuration: Mapping[str, Any]) -> tuple[str, ...]:
         configuration: Of the training (`datasets`: names in the catalogue, or paths).
 
     Returns:
-        Their names, as a loaded recording has them: of a path the file's name without its ending.
+        Their names.
     """
-    return tuple(Path(dataset).stem for dataset in configuration["datasets"])
+    return tuple(recording_name(dataset) for dataset in configuration["datasets"])
 
 
 def period_of_people(recording: Recording, configurations: Sequence[Mapping[str, Any]]) -> dict[int, str]:

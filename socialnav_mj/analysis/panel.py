@@ -27,7 +27,7 @@ class Entry:
     controller: str
     """Its name in the tables."""
     method: str
-    """Of `METHODS`."""
+    """Of `METHODS`, or another name of what is compared."""
     training_seed: int | None = None
     """Of the policy in it; None if there is nothing trained."""
 
