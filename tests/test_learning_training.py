@@ -200,14 +200,28 @@ def test_reward_steps_come_every_so_many_updates():
     assert calls == [4, 8, 12, 16, 20]
 
 
+def test_average_forgets_each_updates_actor_at_its_rate():
+    config = small(guided_scene_steps=10, actor_decay=0.75)
+    model = model_of(config)
+    seen = []
+    keep = model.average.update_parameters
+    model.average.update_parameters = lambda actor: (seen.append(actor.mu.bias.detach().clone()), keep(actor))
+    model.learn(15 * config.n_slots, log_interval=None)
+    expected = seen[0]
+    for bias in seen[1:]:
+        expected = 0.75 * expected + 0.25 * bias
+    assert len(seen) == 5 and not torch.equal(seen[0], seen[-1])
+    torch.testing.assert_close(model.average.module.mu.bias, expected)
+
+
 # Saving
 
 
 @pytest.mark.parametrize("features", ["continuous", "risk"])
-def test_saved_policy_acts_as_the_actor(features, tmp_path):
+def test_saved_policy_acts_as_the_average_actor(features, tmp_path):
     """Numpy equals torch within 1e-6, and a policy that was saved and loaded twice acts the same to the bit."""
-    config = small(features=features, hidden=(16, 16))
-    model = model_of(config)
+    config = small(features=features, hidden=(16, 16), guided_scene_steps=10)
+    model = learned(config, 20)
     policies = []
     for name in ("a.safetensors", "b.safetensors"):
         save_policy(model, tmp_path / name, {"config": config.as_dict()})
@@ -215,6 +229,9 @@ def test_saved_policy_acts_as_the_actor(features, tmp_path):
     state = np.random.default_rng(0).normal(size=(200, feature_set(features).size + 2))
     action = policies[0].action(state)
     np.testing.assert_array_equal(action, policies[1].action(state))
+    latest, _ = model.predict(state.astype(np.float32), deterministic=True)
+    assert np.abs(action - latest).max() > 1e-4
+    model.actor.load_state_dict(model.average.module.state_dict())
     expected, _ = model.predict(state.astype(np.float32), deterministic=True)
     np.testing.assert_allclose(action, expected, atol=1e-6)
     with torch.no_grad():
@@ -311,6 +328,7 @@ def test_what_a_kill_leaves_is_the_checkpoint_as_it_was(killed_and_resumed, tmp_
     assert 0 < model.updates <= 100
     assert model.replay_buffer.size() > 100
     saved = load_policy(str(tmp_path / "latest.safetensors"))
+    model.actor.load_state_dict(model.average.module.state_dict())
     state = np.random.default_rng(0).normal(size=(20, 56)).astype(np.float32)
     np.testing.assert_allclose(saved.action(state), model.predict(state, deterministic=True)[0], atol=1e-6)
 
@@ -356,6 +374,7 @@ def test_configuration_goes_through_json():
         ({"partition": "exact"}, "partition = 'exact' is not allowed; allowed: fused, importance, segment"),
         ({"scene_steps": 0}, "scene_steps = 0 is not allowed"),
         ({"n_slots": -1}, "n_slots = -1 is not allowed"),
+        ({"actor_decay": 1.0}, "actor_decay = 1.0 is not allowed; allowed: numbers in [0, 1)"),
         ({"datasets": ()}, "datasets and shares must not be empty"),
     ],
 )

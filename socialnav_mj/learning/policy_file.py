@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from safetensors.torch import save_file
+from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
 
 from socialnav_mj.files import write_whole, written_whole
@@ -19,7 +20,9 @@ def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
         path: Of the .safetensors file; the card is written beside it.
         card: JSON values.
     """
-    tensors = _linear_layers("actor", [*model.actor.latent_pi, model.actor.mu])
+    actor = model.average.module
+    assert isinstance(actor, Actor)
+    tensors = _linear_layers("actor", [*actor.latent_pi, actor.mu])
     tensors |= _linear_layers("reward", list(model.reward_net.layers))
     with written_whole(path) as part:
         save_file(tensors, part)

@@ -16,6 +16,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
 from stable_baselines3.common.noise import ActionNoise
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from socialnav_mj.features import FeatureSet
 from socialnav_mj.learning.config import TrainingConfig
@@ -60,16 +61,19 @@ class ReplayIRL(SAC):
             gradient_steps=config.updates_per_scene_step,
             replay_buffer_class=SharedReplayBuffer,
             replay_buffer_kwargs={"features": features, "gamma": config.gamma, "seed": config.seed},
-            policy_kwargs={"net_arch": list(config.hidden)},
+            policy_kwargs={"net_arch": list(config.hidden), "optimizer_kwargs": {"fused": True}},
             seed=config.seed,
             device="cpu",
         )
         size = int(np.prod(env.observation_space.shape or ()))
         self.reward_net = RewardNet(size, config.hidden)
         self.reward_optimizer = torch.optim.AdamW(
-            self.reward_net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+            self.reward_net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay, fused=True
         )
         self.replay_buffer.reward_net = self.reward_net
+        average = get_ema_multi_avg_fn(config.actor_decay)  # type: ignore[no-untyped-call]
+        self.average = AveragedModel(self.actor, multi_avg_fn=average)
+        """The actor's moving average: the policy that is validated and kept."""
         self.random = np.random.default_rng(config.seed + 1)
         self.running = experts.running.astype(np.float32)
         self.absorbed = experts.absorbed.astype(np.float32)
@@ -148,6 +152,7 @@ class ReplayIRL(SAC):
         for _ in range(gradient_steps):
             begin = perf_counter()
             super().train(1, batch_size)
+            self.average.update_parameters(self.actor)
             self.updates += 1
             self.seconds["sac"] += perf_counter() - begin
             if self.updates % self.config.updates_per_reward_step == 0:
@@ -212,6 +217,7 @@ class ReplayIRL(SAC):
         assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
         return {
             "policy": self.policy.state_dict(),
+            "average": self.average.state_dict(),
             "actor_optimizer": self.actor.optimizer.state_dict(),
             "critic_optimizer": self.critic.optimizer.state_dict(),
             "log_ent_coef": self.log_ent_coef.detach(),
@@ -234,6 +240,7 @@ class ReplayIRL(SAC):
         """
         assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
         self.policy.load_state_dict(state["policy"])
+        self.average.load_state_dict(state["average"])
         self.actor.optimizer.load_state_dict(state["actor_optimizer"])
         self.critic.optimizer.load_state_dict(state["critic_optimizer"])
         with torch.no_grad():
