@@ -490,6 +490,8 @@ class Reproduce:
     """Seed of the first draw."""
     variants: bool = False
     """Run the variants of the setting and the sweep of the switch distance as well."""
+    variant_draws: int | None = None
+    """Draws of the variants and the sweep; as many as of the default setting by default."""
     jobs: int = -1
     """Processes; -1 for one a core."""
     out: Path = Path("reproduction")
@@ -512,6 +514,7 @@ class Reproduce:
             draws=self.draws,
             seed=self.seed,
             variants=self.variants,
+            variant_draws=self.variant_draws,
         )
         command = shlex.join(["socialnav-mj", *sys.argv[1:]])
         _follow(reproduce(experiment, self.out, command=command, n_jobs=self.jobs), experiment.jobs())

@@ -71,6 +71,22 @@ def test_variants_change_what_they_say_and_nothing_else(experiment):
     assert swept == [d for d in SWEEP for _ in range(2)] and 2.0 not in SWEEP
 
 
+def test_variants_may_have_fewer_draws_than_the_default_setting(experiment):
+    wide = replace(experiment, variants=True, draws=3, variant_draws=2, seed=5)
+    assert [run.evaluation.draws for run in wide.runs()] == [3] + [2] * len(VARIANTS)
+    table = experiment_table(n_draws=9, n_agents=2, trainings=(0, 1))
+    spec = next(e.controller for e in wide.roster(DEFAULT) if e.method == "potential_field")
+    table = table.set_column(
+        table.schema.get_field_index("controller"), "controller", pa.array([spec] * table.num_rows)
+    )
+    variant = next(v for v in VARIANTS if v.name == "switch_anyone")
+    empty = Results(agents=table.slice(0, 0), contacts=pa.table({}), overlaps={}, sources=())
+    results = {"default": replace(empty, agents=table), variant.name: empty}
+    assert max(agents_of(wide, variant, results)["draw"].to_pylist()) == 6
+    with pytest.raises(ValueError, match="variant_draws = 4 is not allowed; allowed: 1 to draws = 3"):
+        replace(wide, variant_draws=4)
+
+
 def test_variant_takes_unchanged_methods_from_the_default_setting(experiment):
     variant = next(v for v in VARIANTS if v.name == "switch_anyone")
     table = experiment_table(n_draws=1, n_agents=2, trainings=(0, 1))

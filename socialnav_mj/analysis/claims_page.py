@@ -62,14 +62,14 @@ def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[st
         lines.append(row(cells))
     lines += [row([label, "not run", "-", "-", "undecided", "0"]) for label in finding.missing] + [""]
     if others:
-        lines += head(["variant", "verdict", "its weakest comparison", "effect", "95 % interval"])
+        lines += head(["variant", "verdict", "its weakest comparison", "effect", "95 % interval", "draws"])
         for name, other in others.items():
             if not other.parts:
-                lines.append(row([titles[name], other.verdict, "none was run", "-", "-"]))
+                lines.append(row([titles[name], other.verdict, "none was run", "-", "-", "0"]))
                 continue
             part, interval, _ = min(other.parts, key=_strength)
             effect = [f"{interval.mean:+.3f}", _range(interval.low, interval.high)]
-            lines.append(row([titles[name], _verdict(other), part.label, *effect]))
+            lines.append(row([titles[name], _verdict(other), part.label, *effect, f"{interval.n_draws}"]))
         lines.append("")
     return lines
 

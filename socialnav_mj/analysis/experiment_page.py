@@ -74,7 +74,9 @@ def experiment_page(
     for drawing in FIGURES:
         lines += [f"![{drawing.name}](figures/{drawing.name}.png)", ""]
     if has_variants:
-        lines += ["## Variants of the setting", "", "![variants](figures/figure_8_variants.png)", ""]
+        drawn = provenance["experiment"]["variant_draws"] or provenance["experiment"]["draws"]
+        lines += ["## Variants of the setting", "", f"Means over {drawn} draws.", ""]
+        lines += ["![variants](figures/figure_8_variants.png)", ""]
     lines += ["## Each training", "", *_trainings(table)]
     lines += ["## In-sample and held out", "", _HELD_OUT, *_periods(held_out)]
     if len(sweep) > 1:
@@ -130,7 +132,8 @@ def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
 
 def _swept(sweep: Mapping[float, LevelTable]) -> list[str]:
     scenarios = next(iter(sweep.values())).scenarios
-    lines = ["Mixed policy: success / share of steps within 1.2 m / time under way [s].", ""]
+    drawn = max(row.interval.n_draws for table in sweep.values() for row in table.rows)
+    lines = [f"Mixed policy over {drawn} draws: success / share of steps within 1.2 m / time under way [s].", ""]
     lines += head(["distance [m]", *(SCENARIO_TITLES.get(s, s) for s in scenarios)])
     measures = (("success", 3), ("intrusion_share_of_steps", 3), ("time_under_way", 1))
     for distance, table in sweep.items():

@@ -28,8 +28,8 @@ class TrainingConfig:
     scene_steps: int = 15_000
     """Control steps of the training scene; every agent under way gives a transition at each."""
     shares: tuple[float, ...] = (0.1, 0.2, 0.3)
-    """Shares of replaced people; the scenes take turns. Agents evade one another and people do not, so among many agents
-    less is learned of people."""
+    """Shares of replaced people; the scenes take turns. Agents evade one another and people do not: among many agents
+    less is learned about people."""
     n_slots: int = 64
     """Environments of the vector environment, at most as many agents at once; draws that need more are passed over."""
     robot_radius: float = 0.25

@@ -63,7 +63,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         panel = make_panel(agents_of(experiment, variant, results), experiment.roster(variant))
         tables[variant.name] = LevelTable(rows=tuple(levels(panel)))
         findings[variant.name] = examine(panel)
-    sweep = _sweep(experiment, results, tables[DEFAULT.name])
+    sweep = _sweep(experiment, results)
     recording = load_recording(experiment.dataset, data_dir=experiment.data_dir)
     periods = period_of_people(recording, [load_policy(policy).card["config"] for policy in experiment.policies])
     held_out = held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods)
@@ -79,7 +79,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
     write_csv(out / "tables" / "switch_distance.csv", swept)
     draw_figures(tables[DEFAULT.name], out / "figures")
     if len(sweep) > 1:
-        draw_sweep(sweep, tables[DEFAULT.name], out / "figures")
+        draw_sweep(sweep, sweep[SWITCH_DISTANCE], out / "figures")
     if experiment.variants:
         draw_variants(tables, titles, out / "figures")
     draw_reward_maps({f"training {k}": load_policy(p) for k, p in experiment.trainings.items()}, out / "figures")
@@ -111,15 +111,21 @@ def agents_of(experiment: Experiment, variant: Variant, results: Mapping[str, Re
     """
     own = results[variant.name].agents
     others = [e.controller for e in experiment.roster(variant) if e.method not in (*variant.runs, HUMAN)]
-    default = results[DEFAULT.name].agents
+    default = _first_draws(experiment, results[DEFAULT.name].agents, variant.name)
     return pa.concat_tables(
         [own, default.filter(pa.compute.is_in(default["controller"], pa.array(others, pa.string())))]
     )
 
 
-def _sweep(experiment: Experiment, results: Mapping[str, Results], default: LevelTable) -> dict[float, LevelTable]:
-    """Levels of the mixed policy by switch distance [m]."""
-    found = {SWITCH_DISTANCE: default}
+def _first_draws(experiment: Experiment, agents: pa.Table, name: str) -> pa.Table:
+    """Agents of the draws that a run has."""
+    return agents.filter(pa.compute.less(agents["draw"], experiment.seed + experiment.draws_of(name)))
+
+
+def _sweep(experiment: Experiment, results: Mapping[str, Results]) -> dict[float, LevelTable]:
+    """Levels by switch distance [m]: of every method at the default one, of the mixed policy at the others."""
+    default = _first_draws(experiment, results[DEFAULT.name].agents, SWEEP_RUN)
+    found = {SWITCH_DISTANCE: LevelTable(rows=tuple(levels(make_panel(default, experiment.roster(DEFAULT)))))}
     if SWEEP_RUN in results:
         for distance in SWEEP:
             panel = make_panel(results[SWEEP_RUN].agents, experiment.sweep_roster(distance))

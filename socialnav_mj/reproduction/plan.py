@@ -58,8 +58,12 @@ class Experiment(Study):
     """Name in the catalogue, or path of a recording."""
     variants: bool = False
     """Whether to run the variants and the sweep of the switch distance as well."""
+    variant_draws: int | None = None
+    """Draws of the variants and the sweep, the first ones of `draws`; None for all."""
 
     def __post_init__(self) -> None:
+        if self.variant_draws is not None and not 1 <= self.variant_draws <= self.draws:
+            raise ValueError(f"variant_draws = {self.variant_draws} is not allowed; allowed: 1 to draws = {self.draws}")
         if not self.policies:
             raise ValueError("policies = () is not allowed; allowed: one or more trained policies")
         seeds = [load_policy(policy).training_seed for policy in self.policies]
@@ -114,6 +118,17 @@ class Experiment(Study):
             for k, p in self.trainings.items()
         )
 
+    def draws_of(self, name: str) -> int:
+        """Number of draws of a run.
+
+        Args:
+            name: Of a variant, or `SWEEP_RUN`.
+
+        Returns:
+            At least 1.
+        """
+        return self.draws if name == DEFAULT.name else self.variant_draws or self.draws
+
     def runs(self) -> list[Run]:
         """Everything that has to be evaluated.
 
@@ -135,7 +150,7 @@ class Experiment(Study):
             data_dir=self.data_dir,
             scenarios=self.scenarios,
             controllers=tuple(entry.controller for entry in roster if entry.method != HUMAN),
-            draws=self.draws,
+            draws=self.draws_of(name),
             seed=self.seed,
             task_kwargs=task_kwargs,
         )
