@@ -13,6 +13,7 @@ from socialnav_mj.analysis.levels import LEVEL_MEASURES, LevelTable, levels
 from socialnav_mj.analysis.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
 from socialnav_mj.analysis.reward_map import MOTIONS, REACH, draw_reward_maps, reward_map
 from socialnav_mj.analysis.style import LOOKS
+from socialnav_mj.analysis.training_curves import draw_training_curves, training_table
 from socialnav_mj.controllers.replay_irl import load_policy
 
 SEEDS = (0, 1, 2)
@@ -149,3 +150,30 @@ def test_reward_maps_are_drawn_with_titles_and_scale(shy, tmp_path):
     for label in ("walker approaching", "walker crossing", "walker receding", "training 1", "learned reward", "alone"):
         assert label in text
     assert paths[1].stat().st_size < 1_000_000 and REACH == 3.0
+
+
+def history_card(kept):
+    seconds = {"sac": 30.0, "reward": 6.0, "all": 60.0}
+    history = [
+        {"scene_steps": k, "success": k / 4e3, "intrusion_share": 0.2, "training_collided": 0.5, "seconds": seconds}
+        for k in (1000, 2000, 3000)
+    ]
+    return {
+        "scene_steps": kept,
+        "transitions": 7,
+        "metrics": {"held_out": {"success": 0.75, "intrusion_share": 0.125}},
+        "history": history,
+    }
+
+
+def test_training_curves_mark_the_kept_checkpoint_and_the_table_says_where_the_time_went(tmp_path):
+    cards = {0: history_card(2000), 3: history_card(3000)}
+    png, svg = draw_training_curves(cards, tmp_path)
+    assert png.stat().st_size > 0
+    text = " ".join(ElementTree.parse(svg).getroot().itertext())
+    assert "training 0" in text and "training 3" in text and "validation success" in text
+    without = draw_training_curves({0: history_card(-1), 3: history_card(-1)}, tmp_path / "b")[1]
+    assert len(svg.read_text()) > len(without.read_text())  # the rings
+    lines = training_table({**cards, 4: {"config": {}}})
+    assert "| 3 | 3000 | 7 | - | - | 0.750 / 0.125 | 50% / 10% / 40% of 1.0 min |" in lines
+    assert "| 4 | - | - | - | - | - | - |" in lines

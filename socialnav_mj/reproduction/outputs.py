@@ -18,6 +18,7 @@ from socialnav_mj.analysis.paired import HUMAN
 from socialnav_mj.analysis.panel import MIXED, make_panel
 from socialnav_mj.analysis.reward_map import draw_reward_maps
 from socialnav_mj.analysis.tables import Results
+from socialnav_mj.analysis.training_curves import draw_training_curves
 from socialnav_mj.analysis.variant_figure import draw_variants
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_whole
@@ -82,6 +83,9 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         draw_sweep(sweep, sweep[SWITCH_DISTANCE], out / "figures")
     if experiment.variants:
         draw_variants(tables, titles, out / "figures")
+    cards = {seed: load_policy(policy).card for seed, policy in experiment.trainings.items()}
+    if all("history" in card for card in cards.values()):
+        draw_training_curves(cards, out / "figures")
     draw_reward_maps({f"training {k}": load_policy(p) for k, p in experiment.trainings.items()}, out / "figures")
     write_whole(out / "claims.md", claims_page(findings, titles=titles, command=command).encode())
     provenance = provenance_of(experiment, results, command=command)
