@@ -1,18 +1,13 @@
 """Many episodes: a grid of scenarios, controllers and draws, in parallel, resumable, one file an episode."""
 
 import json
-import signal
-import threading
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from time import monotonic
 from typing import Any
-
-from joblib import Parallel, delayed
 
 import tasks
 from socialnav_mj.config import Scenario
@@ -21,6 +16,7 @@ from socialnav_mj.environment import make_scenario
 from socialnav_mj.episode import EpisodeError, read_header
 from socialnav_mj.files import write_whole
 from socialnav_mj.human import HUMAN, human_episode
+from socialnav_mj.processes import in_processes
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.rollout import recording_metadata, rollout
 
@@ -203,31 +199,13 @@ def _run_all(jobs: list[Job], folder: Path, n_jobs: int) -> Iterator[Done]:
             yield Done(job=job)
         else:
             waiting.append(job)
-    with _deaf_to_interrupts():
-        # Processes start here and inherit it: Ctrl-C is this process's to handle, which then ends them.
-        results = Parallel(n_jobs=n_jobs, return_as="generator_unordered")(
-            delayed(_run)(job, folder) for job in waiting
-        )
-    for done in results:
+    for done in in_processes(_run, [(job, folder) for job in waiting], n_jobs=n_jobs):
         failed += done.error is not None
         yield done
     if failed:
         raise EvaluationError(
             f"{failed} of {len(jobs)} episodes failed, the others are kept; the same command runs the failed ones again"
         )
-
-
-@contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C for a moment; signals can be set in the main thread alone."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
 
 
 def _run(job: Job, folder: Path) -> Done:

@@ -6,13 +6,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed
-
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_of
 from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import Episode, read_header
 from socialnav_mj.human import HUMAN, human_episode
+from socialnav_mj.processes import in_processes
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.rollout import package_versions, rollout
 
@@ -77,9 +76,7 @@ def verify(
     Raises:
         FileNotFoundError: If there is nothing to verify.
     """
-    yield from Parallel(n_jobs=n_jobs, return_as="generator_unordered")(
-        delayed(_verify)(file, dataset, data_dir) for file in files_of(path)
-    )
+    yield from in_processes(_verify, [(file, dataset, data_dir) for file in files_of(path)], n_jobs=n_jobs)
 
 
 def _verify(path: Path, dataset: str | None, data_dir: str | None) -> Verdict:

@@ -15,7 +15,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 # Top to bottom: a room may import from its own row and from the rows above it. `episode` stands above the simulator
 # although it is filled after it: it is a record of numpy arrays, and physics and task share its Outcome and Partner.
 ROWS = (
-    {"resources", "geometry", "config", "files"},
+    {"resources", "geometry", "config", "files", "processes"},
     {"recordings"},
     {"observation", "episode", "features"},
     {"cast", "scene", "physics", "task", "environment"},

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from socialnav_mj.analysis.paired import HUMAN, HUMAN_COLUMNS, pair_with_humans
 from socialnav_mj.episode import Episode, EpisodeError, Partner
 from socialnav_mj.metrics import ZONES, Fault, Severity, per_agent
 from socialnav_mj.metrics.contacts import pedestrian_overlaps
+from socialnav_mj.processes import in_processes
 
 SCHEMA = pa.schema(
     [
@@ -167,7 +167,7 @@ def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs:
     Args:
         folder: The run; its episodes are `episodes/*.npz`.
         controllers: Order of the controllers; others follow alphabetically, the human row is always last.
-        n_jobs: Processes that read (joblib).
+        n_jobs: Processes that read.
 
     Returns:
         Rows ordered by dataset, share, scenario, controller, draw and agent.
@@ -180,7 +180,7 @@ def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs:
     paths = sorted((Path(folder) / "episodes").glob("[!.]*.npz"))  # not what an interruption left
     if not paths:
         raise FileNotFoundError(f"no episodes in {Path(folder) / 'episodes'}; expected *.npz files")
-    read = joblib.Parallel(n_jobs=n_jobs)(joblib.delayed(_read)(path) for path in paths)
+    read = list(in_processes(_read, [(path,) for path in paths], n_jobs=n_jobs))
     places = {name: place for place, name in enumerate(controllers)}
 
     def key(item: tuple[Source, pa.Table, pa.Table, float]) -> tuple[Any, ...]:
