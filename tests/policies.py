@@ -24,7 +24,7 @@ def random_tensors(features: str = "continuous", hidden: tuple[int, ...] = (8, 8
     return tensors
 
 
-def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed: int = 0) -> str:
+def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed: int = 0, card=None) -> str:
     """Write NAME.safetensors and its card.
 
     Args:
@@ -32,10 +32,11 @@ def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed
         tensors: By name; random ones if not given.
         features: Name of the feature set.
         seed: Of the random ones.
+        card: One that says the features alone if not given.
 
     Returns:
         The path, as `load_policy` takes it.
     """
     save_file(random_tensors(features, seed=seed) if tensors is None else tensors, path)
-    path.with_suffix(".json").write_text(json.dumps({"config": {"features": features}}))
+    path.with_suffix(".json").write_text(json.dumps(card or {"config": {"features": features}}))
     return str(path)

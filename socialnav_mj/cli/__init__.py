@@ -1,0 +1,53 @@
+"""The command `socialnav-mj`: sub-commands, and nothing that another module could do."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from dm_control.rl.control import PhysicsError
+
+from socialnav_mj.cli.catalogue import Data, List
+from socialnav_mj.cli.console import errors, say
+from socialnav_mj.cli.cost import Bench
+from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
+from socialnav_mj.cli.studies import LeaveOneOut, Reproduce, Ship, Train
+
+Command = (
+    Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Verify, tyro.conf.subcommand("verify")]
+    | Annotated[Draws, tyro.conf.subcommand("draws")]
+    | Annotated[List, tyro.conf.subcommand("list")]
+    | Annotated[Data, tyro.conf.subcommand("data")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Ship, tyro.conf.subcommand("ship")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
+)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Entry point; bad input ends in one clear message and exit code 2, an interruption in 130.
+
+    Args:
+        args: Command line without the program's name; sys.argv by default.
+    """
+    command = tyro.cli(
+        Command,
+        prog="socialnav-mj",
+        description="Social navigation in recorded crowds, as a MuJoCo physics benchmark.",
+        args=args,
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
+    )
+    # As `python -m` does, so that package.module:Class finds what lies here; last, so that it hides nothing.
+    sys.path.append(str(Path.cwd()))
+    try:
+        command.run()
+    except KeyboardInterrupt:
+        say("interrupted; the same command goes on where it was", errors)
+        sys.exit(130)
+    except (ValueError, OSError, RuntimeError, PhysicsError) as error:
+        say(f"error: {error}", errors, style="red")
+        sys.exit(2)

@@ -1,0 +1,121 @@
+"""Sub-commands that say what there is."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+from rich.table import Table
+
+from socialnav_mj.cli.arguments import Folder, Name
+from socialnav_mj.cli.console import console, errors, say
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """Show the tasks, controllers and recordings that there are."""
+
+    def run(self) -> None:
+        """Print three tables."""
+        import tasks
+        from socialnav_mj.controllers import available
+        from socialnav_mj.recordings.catalogue import catalogue
+
+        table = Table("task", "replaced", title="tasks", title_justify="left")
+        for name in tasks.ALL_TASKS:
+            table.add_row(name, f"{tasks.SHARES[name]:.0%}")
+        console.print(table)
+        table = Table("controller", title="controllers", title_justify="left")
+        for name in available():
+            table.add_row(name)
+        table.add_row("package.module:Class")
+        console.print(table)
+        table = Table("recording", "variants", "what it is", title="recordings", title_justify="left")
+        for name, row in catalogue().items():
+            table.add_row(name, ", ".join(row.variants), row.title)
+        console.print(table)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataList:
+    """Known recordings: source, licence, checksums, frame rate, scale, and whether they are on this machine."""
+
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+
+    def run(self) -> None:
+        """Print the catalogue."""
+        from socialnav_mj.recordings.catalogue import catalogue, load_recording
+
+        for name, row in catalogue().items():
+            table = Table(show_header=False, title=f"{name}: {row.title}", title_justify="left")
+            table.add_column()
+            table.add_column(overflow="fold")
+            for label in ("source", "licence", "scale"):
+                table.add_row(label, getattr(row, label))
+            table.add_row("frame rate", f"{row.frame_rate:g} Hz")
+            for variant, files in row.variants.items():
+                for file, checksum in files.items():
+                    table.add_row(f"{variant}: {file}", f"sha256 {checksum}")
+            try:
+                load_recording(name, data_dir=self.data_dir)
+                table.add_row("here", "yes")
+            except FileNotFoundError:
+                table.add_row("here", f"no: socialnav-mj data fetch {name}")
+            console.print(table)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataInfo:
+    """Facts of a recording: people, concurrency, speeds, distances, and who comes how near."""
+
+    name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
+    """Name in the catalogue, or path of a recording."""
+    variant: Name = None
+    """Which annotation; the first by default."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+
+    def run(self) -> None:
+        """Print the facts."""
+        from rich.markdown import Markdown
+
+        from socialnav_mj.recordings import load_recording
+        from socialnav_mj.recordings.facts import facts, facts_table
+
+        recording = load_recording(self.name, variant=self.variant, data_dir=self.data_dir)
+        console.print(Markdown(facts_table({recording.name: facts(recording)})))
+        say(f"variant {recording.variant}, checksum {recording.checksum}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataFetch:
+    """Download a recording from its public source and verify its checksum."""
+
+    name: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="NAME")]
+    """Name in the catalogue."""
+    data_dir: Folder = None
+    """Where to put it; the user cache by default."""
+
+    def run(self) -> None:
+        """Download."""
+        from socialnav_mj.recordings.fetch import fetch
+
+        with errors.status(f"downloading {self.name}"):
+            paths = fetch(self.name, data_dir=self.data_dir)
+        for path in paths:
+            say(str(path))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Data:
+    """Recordings: list, info, fetch."""
+
+    action: tyro.conf.OmitSubcommandPrefixes[
+        Annotated[DataList, tyro.conf.subcommand("list")]
+        | Annotated[DataInfo, tyro.conf.subcommand("info")]
+        | Annotated[DataFetch, tyro.conf.subcommand("fetch")]
+    ]
+
+    def run(self) -> None:
+        """Do what was asked for."""
+        self.action.run()

@@ -1,0 +1,82 @@
+"""The sub-command that measures."""
+
+import json
+import shlex
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.table import Table
+
+from socialnav_mj.cli.arguments import Folder, Scenarios
+from socialnav_mj.cli.console import console, errors
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Measure what episodes cost on one core, beside bare `mj_step` calls, as ratios."""
+
+    dataset: str = "plaza"
+    """Name in the catalogue, or path of a recording."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    scenarios: Scenarios = (1, 4)
+    """Scenarios to measure."""
+    controller: str = "potential_field"
+    """See `evaluate`."""
+    seed: int = 0
+    """Seed of the draw."""
+    repetitions: int = 3
+    """Episodes and bare runs, in turn; the median is shown."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """JSON file to write, with package versions and the recording's checksum."""
+
+    def run(self) -> None:
+        """Measure and print."""
+        from socialnav_mj.benchmark import measure
+        from socialnav_mj.files import write_whole
+        from socialnav_mj.recordings import load_recording
+        from socialnav_mj.rollout import PACKAGES, package_versions
+
+        recording = load_recording(self.dataset, data_dir=self.data_dir)
+        costs = []
+        for number in self.scenarios:
+            with errors.status(f"scenario {number}"):
+                cost = measure(
+                    recording,
+                    f"scenario_{number}",
+                    controller=self.controller,
+                    seed=self.seed,
+                    repetitions=self.repetitions,
+                )
+            costs.append(cost)
+        table = Table(title=f"{recording.name}, {self.controller}, CPU time on one core", title_justify="left")
+        table.add_column("")
+        rows: dict[str, list[str]] = {}
+        for cost in costs:
+            table.add_column(cost.scenario, justify="right")
+            for label, text in {
+                "agents": f"{cost.n_agents}",
+                "simulated [s]": f"{cost.simulated_time:.1f}",
+                "episode CPU [s]": f"{cost.episode_cpu:.2f}",
+                "bare mj_step CPU [s]": f"{cost.physics_cpu:.2f}",
+                "episode / mj_step": f"{cost.ratio:.2f} ({cost.ratio_low:.2f} to {cost.ratio_high:.2f})",
+                "real-time factor": f"{cost.real_time_factor:.1f}",
+                "saving / episode": f"{cost.save_share:.1%}",
+                "trace / episode": f"{cost.trace_share:.1%}",
+                "trace [MB]": f"{cost.trace_megabytes:.2f}",
+            }.items():
+                rows.setdefault(label, []).append(text)
+        for label, cells in rows.items():
+            table.add_row(label, *cells)
+        console.print(table)
+        if self.out is not None:
+            content = {
+                "command": shlex.join(sys.argv),
+                "recording": {"name": recording.name, "variant": recording.variant, "checksum": recording.checksum},
+                "versions": package_versions(PACKAGES),
+                "costs": [asdict(cost) for cost in costs],
+            }
+            write_whole(self.out, (json.dumps(content, indent=1) + "\n").encode())

@@ -1,0 +1,159 @@
+"""Sub-commands that run scenarios, and look at what was run."""
+
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.table import Table
+
+from socialnav_mj.cli.arguments import Folder, Name, Scenarios
+from socialnav_mj.cli.console import console, counted_progress, errors, follow, say
+from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate:
+    """Run scenarios with controllers, score them beside the recorded people, and write tables and traces.
+
+    Run again after an interruption, the same command goes on where it was.
+    """
+
+    dataset: str = "plaza"
+    """Name in the catalogue (see `list`), or path of a recording's file or folder."""
+    variant: Name = None
+    """Which annotation of the recording (see `data list`); the first by default."""
+    data_dir: Folder = None
+    """Where recordings are looked for first; then in $SOCIALNAV_MJ_DATA, then in the user cache."""
+    scenarios: Scenarios = (1, 2, 3, 4)
+    """Scenarios that replace 10, 30, 70, 90 % of the people."""
+    controllers: tuple[str, ...] = ("potential_field", "go_straight")
+    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(attraction_limit=None)'.
+    replay_irl and hybrid act with the shipped policy that learned from the recording, if there is one, else with
+    plaza's."""
+    draws: int = 3
+    """Random choices of the replaced people; 10 or more for figures to publish."""
+    seed: int = 0
+    """Seed of the first draw; the others count up from it."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Folder = None
+    """Folder of the results; runs/DATASET by default."""
+    robot_radius: float = Robot.radius
+    """[m]"""
+    pedestrian_radius: float = Scenario.pedestrian_radius
+    """[m]"""
+    turn_limit: TurnLimit = Scenario.turn_limit
+    """Reading of the paper's pi/6: a turn per control step, or rad/s."""
+    on_collision: OnCollision = Scenario.on_collision
+    """What an agent does after a collision; its success is void either way."""
+    control_timestep: float = Scenario.control_timestep
+    """Time between two actions [s]."""
+
+    def run(self) -> None:
+        """Evaluate, then report."""
+        from socialnav_mj.analysis.report import write_report
+        from socialnav_mj.controllers import with_policy_of
+        from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
+
+        names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
+        evaluation = Evaluation(
+            dataset=self.dataset,
+            variant=self.variant,
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            controllers=tuple(with_policy_of(spec, self.dataset) for spec in self.controllers),
+            draws=self.draws,
+            seed=self.seed,
+            task_kwargs={name: getattr(self, name) for name in names},
+        )
+        out = self.out or Path("runs") / Path(self.dataset).resolve().stem
+        episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)
+        follow(episodes, jobs_of(evaluation))
+        with errors.status("tables and traces"):
+            report = write_report(out, console=console, n_jobs=self.jobs)
+        say(f"report: {report}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Make the tables, the report and the traces of a run again from its episodes."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
+    """Of `evaluate`."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+
+    def run(self) -> None:
+        """Report."""
+        from socialnav_mj.analysis.report import write_report
+
+        path = write_report(self.folder, console=console, n_jobs=self.jobs)
+        say(f"report: {path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verify:
+    """Run stored episodes again and compare the hashes of their states; exit code 1 if one differs."""
+
+    path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
+    """Folder of `evaluate`, an episode (.npz), or a trace (.rrd)."""
+    dataset: Name = None
+    """Name or path of the recording; by default the name that each file gives."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+
+    def run(self) -> None:
+        """Verify."""
+        from socialnav_mj.verification import files_of, verify
+
+        total, wrong = len(files_of(self.path)), 0
+        with counted_progress() as progress:
+            bar = progress.add_task("files", total=total)
+            data_dir = None if self.data_dir is None else str(self.data_dir)
+            for verdict in verify(self.path, dataset=self.dataset, data_dir=data_dir, n_jobs=self.jobs):
+                progress.advance(bar)
+                wrong += not verdict.same
+                if verdict.error is not None:
+                    result = verdict.error
+                elif verdict.same:
+                    result = f"same {verdict.hash[:16]}"
+                else:
+                    result = f"DIFFERS: stored {verdict.stored_hash[:16]}, now {verdict.hash[:16]}"
+                    if verdict.other_versions:
+                        result += f" (then and now: {'; '.join(verdict.other_versions)})"
+                say(f"{verdict.path.name}: {result}")
+        say(f"{total - wrong} of {total} files give the same states again")
+        if wrong:
+            sys.exit(1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draws:
+    """How many draws it takes to tell two controllers apart by a given difference, from the spread in a run."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
+    """Of `evaluate`, with two draws or more."""
+    measure: str = "success"
+    """A measure of summary.csv."""
+    difference: float = 0.05
+    """To be resolved at 95 %, in the measure's unit."""
+
+    def run(self) -> None:
+        """Print a table."""
+        import pyarrow.parquet
+
+        from socialnav_mj.analysis.draws import resolutions
+
+        agents = pyarrow.parquet.read_table(self.folder / "agents.parquet")
+        table = Table(title=f"draws that resolve {self.difference:g} of {self.measure} at 95 %", title_justify="left")
+        for heading in ("scenario", "controllers", "draws here", "spread", "for the interval", "for 80 % power"):
+            table.add_column(heading)
+        for r in resolutions(agents, {self.measure: self.difference}):
+            needed = (str(r.n_draws), f"{r.spread:.4f}", str(r.draws), str(r.draws_for_power))
+            table.add_row(r.scenario, " - ".join(r.controllers), *needed)
+        console.print(table)

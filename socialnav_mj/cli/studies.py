@@ -1,0 +1,201 @@
+"""Sub-commands that learn, and answer a question with many runs."""
+
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from socialnav_mj.cli.arguments import Folder, Scenarios
+from socialnav_mj.cli.console import counted_progress, errors, follow, say
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Learn a reward and a policy from recorded people; goes on with a training that was stopped."""
+
+    method: tyro.conf.Positional[Literal["replay-irl"]]
+    """What to train."""
+    dataset: tuple[str, ...] = ("plaza",)
+    """Recordings to learn from: names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    features: Literal["continuous", "risk"] = "continuous"
+    """Feature set of policy and reward."""
+    partition: Literal["fused", "importance", "segment"] = "fused"
+    """Estimate of the partition function."""
+    seed: int = 0
+    """Of networks, exploration, sampling and draws."""
+    scene_steps: int | None = None
+    """Control steps of the training scene; the committed configuration's by default."""
+    out: Folder = None
+    """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
+
+    def run(self) -> None:
+        """Train."""
+        try:
+            from socialnav_mj.learning.config import TrainingConfig
+            from socialnav_mj.learning.training import Progress as Step
+            from socialnav_mj.learning.training import train
+        except ImportError as error:
+            raise RuntimeError(
+                f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
+            ) from error
+        config = TrainingConfig(
+            datasets=self.dataset,
+            features=self.features,
+            partition=self.partition,
+            seed=self.seed,
+            scene_steps=self.scene_steps or TrainingConfig.scene_steps,
+        )
+        label = "+".join(Path(name).stem for name in self.dataset)
+        out = self.out or Path("runs") / "train" / f"{label}_{self.features}_seed{self.seed}"
+        with counted_progress() as progress:
+            bar = progress.add_task("scene steps", total=config.scene_steps)
+
+            def report(step: Step) -> None:
+                progress.update(bar, completed=step.scene_steps)
+                if step.validation is not None:
+                    v = step.validation
+                    say(
+                        f"{step.scene_steps} scene steps, {step.transitions} transitions: validation success "
+                        f"{v['success']:.3f}, share of steps within 1.2 m {v['intrusion_share']:.3f}",
+                        progress.console,
+                    )
+
+            best = train(config, out, data_dir=None if self.data_dir is None else str(self.data_dir), progress=report)
+        say(f"policy: {best}\nuse it: --controllers \"replay_irl(policy='{best}')\"")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ship:
+    """Put finished trainings among the shipped policies, as DATASETS_FEATURES_seedSEED.
+
+    Every card states how the trainings that differ by their seed alone spread.
+    """
+
+    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER")]
+    """Of `train`."""
+    out: Folder = None
+    """Folder of policies; the package's own by default."""
+
+    def run(self) -> None:
+        """Ship."""
+        from socialnav_mj.controllers.replay_irl import policies_folder
+        from socialnav_mj.learning.shipping import ship
+
+        for path in ship(self.folders, self.out or policies_folder()):
+            say(f"policy: {path}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce:
+    """Run the paper's experiment: potential field, ReplayIRL of each training, both mixed, and the recorded humans.
+
+    Writes figures, tables and claims.md, with a verdict on every sentence of the paper's results. Run again after an
+    interruption, the same command goes on where it was.
+    """
+
+    dataset: str = "students003"
+    """Name in the catalogue, or path of a recording."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    policies: tuple[str, ...] = ()
+    """Names of shipped policies, or paths of .safetensors files; those trained on the recording by default."""
+    features: Literal["continuous", "risk"] = "continuous"
+    """Feature set of the shipped policies to take."""
+    scenarios: Scenarios = (1, 2, 3, 4)
+    """Scenarios to run; most claims are about all four."""
+    draws: int = 10
+    """Random choices of the replaced people."""
+    seed: int = 0
+    """Seed of the first draw."""
+    variants: bool = False
+    """Run the variants of the setting and the sweep of the switch distance as well."""
+    variant_draws: int | None = None
+    """Draws of the variants and the sweep; as many as of the default setting by default."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path = Path("reproduction")
+    """Folder of the results."""
+    publish: Folder = None
+    """Folder that gets a copy of figures, tables and pages: all that holds no recording and no episode."""
+
+    def run(self) -> None:
+        """Run, then draw and write."""
+        from socialnav_mj.reproduction.outputs import PUBLIC, write_outputs
+        from socialnav_mj.reproduction.plan import Experiment, shipped_for
+        from socialnav_mj.reproduction.record import publish
+        from socialnav_mj.reproduction.study import reproduce
+
+        experiment = Experiment(
+            dataset=self.dataset,
+            policies=self.policies or shipped_for(self.dataset, self.features),
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            draws=self.draws,
+            seed=self.seed,
+            variants=self.variants,
+            variant_draws=self.variant_draws,
+        )
+        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
+        follow(reproduce(experiment, self.out, command=command, n_jobs=self.jobs), experiment.jobs())
+        with errors.status("tables and figures"):
+            page = write_outputs(experiment, self.out, command=command, n_jobs=self.jobs)
+        say(f"report: {page}\nclaims: {self.out / 'claims.md'}")
+        if self.publish is not None:
+            say(f"to be committed: {publish(self.out, self.publish, PUBLIC)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaveOneOut:
+    """Run policies that learned from all recordings but one on each recording: in-sample and held out side by side.
+
+    Writes tables over the agents that replace people whom the in-sample policies learned from. Run again after an
+    interruption, the same command goes on where it was.
+    """
+
+    recordings: tuple[str, ...] = ("students003", "zara01", "zara02")
+    """Names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    policies: tuple[str, ...] = ()
+    """Names of shipped policies, or paths of .safetensors files; those that left one recording out by default."""
+    features: Literal["continuous", "risk"] = "continuous"
+    """Feature set of the shipped policies to take."""
+    scenarios: Scenarios = (1, 2)
+    """Scenarios to run."""
+    draws: int = 10
+    """Random choices of the replaced people."""
+    seed: int = 0
+    """Seed of the first draw."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path = Path("leave_one_out")
+    """Folder of the results."""
+    publish: Folder = None
+    """Folder that gets a copy of tables and page: all that holds no recording and no episode."""
+
+    def run(self) -> None:
+        """Run, then write."""
+        from socialnav_mj.reproduction import leave_one_out
+        from socialnav_mj.reproduction.record import publish
+        from socialnav_mj.reproduction.study import reproduce
+
+        study = leave_one_out.LeaveOneOut(
+            recordings=self.recordings,
+            policies=self.policies or leave_one_out.shipped_leaving_one_out(self.recordings, self.features),
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            draws=self.draws,
+            seed=self.seed,
+        )
+        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
+        follow(reproduce(study, self.out, command=command, n_jobs=self.jobs), study.jobs())
+        with errors.status("tables"):
+            page = leave_one_out.write_leave_one_out(study, self.out, command=command, n_jobs=self.jobs)
+        say(f"report: {page}")
+        if self.publish is not None:
+            say(f"to be committed: {publish(self.out, self.publish, leave_one_out.PUBLIC)}")
