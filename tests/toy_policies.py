@@ -51,6 +51,10 @@ def write_toy(
         "datasets": list(datasets),
         "train_window": [0.0, train_end],
         "validation_window": [train_end, train_end + 0.1],
+        "intrusion_weight": 0.5,
     }
-    (folder / f"{name}.json").write_text(json.dumps({"config": config}))
+    seconds = {"sac": 3.0, "reward": 1.0, "all": 10.0}
+    entry = {"scene_steps": 7, "success": 0.5, "intrusion_share": 0.25, "training_collided": 0.5, "seconds": seconds}
+    card = {"config": config, "scene_steps": 7, "transitions": 70, "history": [entry]}
+    (folder / f"{name}.json").write_text(json.dumps(card))
     return str(folder / f"{name}.safetensors")

@@ -40,7 +40,8 @@ nothing show what the crowd alone changes.
 _TRAINING = """\
 What the trainings' cards say, with seeds of their own on scenes with 10, 30 and 90 % agents in each part of the \
 recording. Runs that an edge of a part cuts short are easier, so the figures do not compare with those above. The kept \
-checkpoint (ring) has the greatest validation success - %s x share. Training collides at wider bodies than evaluation.
+checkpoint (ring) has the greatest validation success - {weight} x share. Training collides at wider bodies than \
+evaluation.
 """
 _REWARD = """\
 Learned reward of an agent that drives at 0.8 m/s towards a goal 5 m ahead, with one walker (1 m/s) at each place \
@@ -87,7 +88,8 @@ def experiment_page(
     lines += ["## Each training", "", *_trainings(table)]
     if all("history" in card for card in cards.values()):
         weight = next(iter(cards.values()))["config"]["intrusion_weight"]
-        lines += [_TRAINING % weight, *training_table(cards), "", "![training](figures/figure_9_training.png)", ""]
+        lines += [_TRAINING.format(weight=weight), *training_table(cards), ""]
+        lines += ["![training](figures/figure_9_training.png)", ""]
     lines += ["## In-sample and held out", "", _HELD_OUT, *_periods(held_out)]
     if len(sweep) > 1:
         lines += ["## Switch distance", "", *_swept(sweep), "![sweep](figures/figure_6_switch_distance.png)", ""]
