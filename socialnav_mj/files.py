@@ -1,9 +1,11 @@
 """Files that appear whole or not at all."""
 
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 @contextmanager
@@ -41,3 +43,13 @@ def write_whole(path: str | Path, content: bytes) -> Path:
     with written_whole(path) as part:
         part.write_bytes(content)
     return Path(path)
+
+
+def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
+    """Write JSON, equal bytes for equal content.
+
+    Args:
+        path: Target.
+        content: JSON values.
+    """
+    write_whole(path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())

@@ -1,6 +1,5 @@
 """Trained weights as safetensors with a JSON card."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,7 @@ from safetensors.torch import save_file
 from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
 
-from socialnav_mj.files import write_whole, written_whole
+from socialnav_mj.files import write_json, written_whole
 from socialnav_mj.learning.replay_irl import ReplayIRL
 
 
@@ -26,7 +25,7 @@ def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
     tensors |= _linear_layers("reward", list(model.reward_net.layers))
     with written_whole(path) as part:
         save_file(tensors, part)
-    write_whole(path.with_suffix(".json"), (json.dumps(card, indent=1, sort_keys=True) + "\n").encode())
+    write_json(path.with_suffix(".json"), card)
 
 
 def _linear_layers(network: str, modules: list[nn.Module]) -> dict[str, Tensor]:

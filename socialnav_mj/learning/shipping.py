@@ -1,6 +1,5 @@
 """From finished trainings to the policies that travel with the package, and how much their seeds matter."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from socialnav_mj.controllers.replay_irl import PolicyError, load_policy
-from socialnav_mj.files import write_whole
+from socialnav_mj.files import write_json, write_whole
 
 MEASURES = ("success", "intrusion_share", "time_under_way")
 BEST = "best.safetensors"
@@ -56,8 +55,7 @@ def ship(folders: Sequence[Path], target: Path) -> list[Path]:
             card, weights = found[name]
             if weights is not None:
                 write_whole(target / f"{name}.safetensors", weights)
-            content = json.dumps({**card, "seed_spread": spread}, indent=1, sort_keys=True) + "\n"
-            write_whole(target / f"{name}.json", content.encode())
+            write_json(target / f"{name}.json", {**card, "seed_spread": spread})
     return [target / f"{name}.safetensors" for name in shipped]
 
 

@@ -18,23 +18,23 @@ from socialnav_mj import metrics
 from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
 from socialnav_mj.environment import make_scenario
 from socialnav_mj.features import feature_set
-from socialnav_mj.files import write_whole, written_whole
+from socialnav_mj.files import write_json, write_whole, written_whole
 from socialnav_mj.learning.config import TrainingConfig
 from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
 from socialnav_mj.learning.experts import Demonstrations, demonstrate
 from socialnav_mj.learning.policy_file import save_policy
 from socialnav_mj.learning.replay_irl import ReplayIRL
+from socialnav_mj.learning.shipping import BEST
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.window import window
 from socialnav_mj.rollout import package_versions, rollout
 
 PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
-CHECKPOINT, BUFFER, HISTORY, CONFIG, BEST = (
+CHECKPOINT, BUFFER, HISTORY, CONFIG = (
     "checkpoint.pt",
     "buffer.npz",
     "history.json",
     "config.json",
-    "best.safetensors",
 )
 
 
@@ -130,7 +130,7 @@ def _complete_card(
         for name, part in parts.items()
     }
     card["history"] = history
-    write_whole(card_path, (json.dumps(card, indent=1, sort_keys=True) + "\n").encode())
+    write_json(card_path, card)
 
 
 def validate(

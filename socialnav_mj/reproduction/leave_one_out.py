@@ -12,9 +12,9 @@ from socialnav_mj.analysis.panel import POTENTIAL_FIELD, Entry
 from socialnav_mj.analysis.tables import Results
 from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_whole
+from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.recordings import Recording, load_recording
-from socialnav_mj.reproduction.record import level_rows, provenance_of, write_csv, write_json
+from socialnav_mj.reproduction.record import level_rows, provenance_of, write_csv
 from socialnav_mj.reproduction.study import Run, Study, learned, read_runs
 from socialnav_mj.rollout import recording_metadata
 

@@ -21,7 +21,7 @@ from socialnav_mj.analysis.tables import Results
 from socialnav_mj.analysis.training_curves import draw_training_curves
 from socialnav_mj.analysis.variant_figure import draw_variants
 from socialnav_mj.controllers.replay_irl import load_policy
-from socialnav_mj.files import write_whole
+from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.reproduction.plan import (
     DEFAULT,
@@ -31,7 +31,7 @@ from socialnav_mj.reproduction.plan import (
     Experiment,
     Variant,
 )
-from socialnav_mj.reproduction.record import level_rows, provenance_of, write_csv, write_json
+from socialnav_mj.reproduction.record import level_rows, provenance_of, write_csv
 from socialnav_mj.reproduction.study import read_runs
 from socialnav_mj.rollout import recording_metadata
 
@@ -64,7 +64,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         panel = make_panel(agents_of(experiment, variant, results), experiment.roster(variant))
         tables[variant.name] = LevelTable(rows=tuple(levels(panel)))
         findings[variant.name] = examine(panel)
-    sweep = _sweep(experiment, results)
+    sweep = _sweep(experiment, results, tables[DEFAULT.name])
     recording = load_recording(experiment.dataset, data_dir=experiment.data_dir)
     periods = period_of_people(recording, [load_policy(policy).card["config"] for policy in experiment.policies])
     held_out = held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods)
@@ -126,10 +126,12 @@ def _first_draws(experiment: Experiment, agents: pa.Table, name: str) -> pa.Tabl
     return agents.filter(pa.compute.less(agents["draw"], experiment.seed + experiment.draws_of(name)))
 
 
-def _sweep(experiment: Experiment, results: Mapping[str, Results]) -> dict[float, LevelTable]:
+def _sweep(experiment: Experiment, results: Mapping[str, Results], table: LevelTable) -> dict[float, LevelTable]:
     """Levels by switch distance [m]: of every method at the default one, of the mixed policy at the others."""
-    default = _first_draws(experiment, results[DEFAULT.name].agents, SWEEP_RUN)
-    found = {SWITCH_DISTANCE: LevelTable(rows=tuple(levels(make_panel(default, experiment.roster(DEFAULT)))))}
+    if experiment.draws_of(SWEEP_RUN) < experiment.draws:
+        agents = _first_draws(experiment, results[DEFAULT.name].agents, SWEEP_RUN)
+        table = LevelTable(rows=tuple(levels(make_panel(agents, experiment.roster(DEFAULT)))))
+    found = {SWITCH_DISTANCE: table}
     if SWEEP_RUN in results:
         for distance in SWEEP:
             panel = make_panel(results[SWEEP_RUN].agents, experiment.sweep_roster(distance))

@@ -75,16 +75,6 @@ def level_rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
     ]
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write JSON, equal bytes for equal content.
-
-    Args:
-        path: Target.
-        content: JSON values.
-    """
-    write_whole(path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())
-
-
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a table; numbers with six digits, NaN as nothing.
 
