@@ -1,13 +1,14 @@
 """Figures exist, say what they show in text, are the same for the same numbers, and survive missing ones."""
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from agents import METHOD_VALUES, experiment_table, roster_of
 from toy_policies import write_toy
 
-from socialnav_mj.analysis import style, two_way
+from socialnav_mj.analysis import figures, style, two_way
 from socialnav_mj.analysis.figures import FIGURES, draw_figures, draw_sweep
 from socialnav_mj.analysis.levels import LEVEL_MEASURES, LevelTable, levels
 from socialnav_mj.analysis.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
@@ -78,6 +79,26 @@ def test_five_figures_appear_as_png_and_svg_with_their_labels(table, tmp_path):
             assert all(f"({'abcd'[k]}) scenario {k + 1}" in text for k in range(4))
             assert "each training" in text
     assert "1.2 m" in texts(tmp_path / "figure_4_intrusions.svg")
+
+
+def test_every_panel_is_tall_enough_for_its_values(table, tmp_path, monkeypatch):
+    """Panels of a row share their axis, whichever has the greatest value: here the last, ten times the first."""
+    grown = {scenario: 0.1 * 10.0 ** (place / 3.0) for place, scenario in enumerate(table.scenarios)}
+    ends = ("mean", "low", "high")
+    rows = [
+        replace(
+            row, interval=replace(row.interval, **{e: grown[row.scenario] * getattr(row.interval, e) for e in ends})
+        )
+        for row in table.rows
+    ]
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, folder, name: drawn.append(figure) or [])
+    draw_figures(LevelTable(rows=tuple(rows)), tmp_path)
+    panels = [axes for figure in drawn for axes in figure.axes]
+    assert len(panels) == 4 * 5 + 3
+    for axes in panels:
+        bottom, top = axes.get_ylim()
+        assert bottom <= axes.dataLim.y0 + 1e-9 and axes.dataLim.y1 <= top + 1e-9
 
 
 def test_equal_levels_give_equal_files(table, tmp_path):

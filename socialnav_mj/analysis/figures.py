@@ -164,9 +164,10 @@ def _bars(table: LevelTable, drawing: Drawing) -> Figure:
             _human_band(axes, table.find(scenario, HUMAN, row.measure))
             axes.set_xticks([])
             axes.set_xlim(-0.6, len(ROBOTS) - 0.4)
-            axes.set_ylim(0.0, row.top)
             if line == 0:
                 axes.set_title(short_title(scenario, place))
+        # After all panels: a limit set before would be the first one's.
+        axes_row[0].set_ylim(0.0, row.top)
         axes_row[0].set_ylabel(row.label)
     _legend(figure, bars=True)
     return figure
