@@ -13,13 +13,16 @@ PROXIMITY, CLOSING = 6, 18
 GOAL, COLLISION = [1.0, 0.0], [0.0, 1.0]
 
 
-def demonstrations(*walks, features=None, contact_distance=0.25, minimum_displacement=2.0) -> Demonstrations:
+def demonstrations(
+    *walks, features=None, contact_distance=0.25, clearance=0.0, minimum_displacement=2.0
+) -> Demonstrations:
     return demonstrate(
         recording_of(*walks),
         features or Continuous(),
         Scenario(),
         minimum_displacement=minimum_displacement,
         contact_distance=contact_distance,
+        clearance=clearance,
     )
 
 
@@ -48,6 +51,19 @@ def test_contact_counts_before_arrival_as_for_an_agent():
     walker, bystander = walk([(0.0, 0.0), (4.0, 0.0)], 1.0), stand((4.0, 0.2), 0.0, 4.0)
     assert demonstrations(walker, bystander).absorbed[:, -2:].tolist() == [GOAL]
     assert demonstrations(walker, bystander, contact_distance=0.6).absorbed[:, -2:].tolist() == [COLLISION]
+
+
+def test_states_without_clearance_are_left_out_and_the_run_goes_on():
+    """Head on, 0.5 m aside, 2 m/s relative: below 0.9 m while 0.75 m or less before or after; the rest stays."""
+    walks = walk([(0.0, 0.0), (6.0, 0.0)], 1.0), walk([(6.0, 0.5), (0.0, 0.5)], 1.0)
+    every, clear = demonstrations(*walks), demonstrations(*walks, clearance=0.9)
+    ahead = np.abs(6.0 - 2.0 * 0.2 * np.arange(len(every.running) // 2))
+    kept = np.repeat(np.hypot(ahead, 0.5) >= 0.9, 2)
+    assert 0 < (~kept).sum() < len(kept)
+    np.testing.assert_array_equal(clear.running, every.running[kept])
+    np.testing.assert_array_equal(clear.absorbed, every.absorbed)
+    side_by_side = walk([(0.0, 0.0), (6.0, 0.0)], 0.8), walk([(0.0, 0.5), (6.0, 0.5)], 0.8)  # companions
+    assert len(demonstrations(*side_by_side, clearance=0.9).running) == len(demonstrations(*side_by_side).running)
 
 
 def test_companions_do_not_see_each_other_but_see_strangers():
@@ -109,7 +125,7 @@ def test_demonstrations_do_not_change_when_the_crowd_is_turned_and_moved(feature
         **{**vars_of(recording), "positions": tuple(x @ turn + shift for x in recording.positions)}
     )
     expected, found = (
-        demonstrate(r, features, Scenario(), minimum_displacement=2.0, contact_distance=0.25)
+        demonstrate(r, features, Scenario(), minimum_displacement=2.0, contact_distance=0.25, clearance=0.0)
         for r in (recording, turned)
     )
     assert expected.running.shape[1] == features.size + 2 and len(expected.absorbed) == 3

@@ -47,13 +47,13 @@ class TrainingConfig:
     """Of SAC and of either half of a reward step."""
     tau: float = 0.005
     """Polyak average of the target critics."""
-    updates_per_scene_step: int = 2
+    updates_per_scene_step: int = 4
     """SAC updates after each control step of the scene."""
     updates_per_reward_step: int = 4
     """SAC updates between two reward steps."""
-    actor_decay: float = 0.999
-    """Of the moving average over SAC updates of the actor's weights that is validated and kept: it arrived .02 to .03
-    more often than the last actor in scenario 1 of students003."""
+    averaging_power: float = 8.0
+    """Of the average of the actor's weights that is validated and kept: update t of SAC counts about as t to this
+    power, so their mean age is a tenth of t (polynomial-decay averaging, Shamir and Zhang, ICML 2013)."""
     guided_scene_steps: int = 2500
     """Control steps before any update, in which the guide acts instead of the actor."""
     guide: str = "potential_field"
@@ -83,12 +83,21 @@ class TrainingConfig:
     """Recorded people collide when nearer than this to somebody who is no companion: 2 % of the experts of students003.
     At the robots' 0.32 m 14 % would, and demonstrate collisions that were none [m]."""
 
+    expert_clearance: float = 0.56
+    """People with somebody nearer than this show nothing: no agent of the training scene can be so near without a
+    collision, and the reward would take nearness for what tells people from agents [m]."""
+
     checkpoint_every: int = 1500
     """Scene steps between checkpoints; each is validated."""
+    kept_from: float = 0.8
+    """Share of the scene steps after which a checkpoint is kept before any earlier one: validation flatters some early
+    ones (docs/learning.md)."""
     validation_shares: tuple[float, ...] = (0.1, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.9)
     """Scenes of a validation, with draws 0, 1, 2, ..."""
     intrusion_weight: float = 0.5
-    """The best checkpoint has the greatest success - intrusion_weight * share of steps within 1.2 m."""
+    """A checkpoint's score is its success - intrusion_weight * share of steps within 1.2 m. Of the late ones the last
+    whose score is within one standard error of the best is kept (Breiman et al., Classification and Regression Trees,
+    1984)."""
 
     def __post_init__(self) -> None:
         if self.partition not in get_args(Partition):
@@ -106,9 +115,11 @@ class TrainingConfig:
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: integers >= 1")
         feature_set(self.features)
-        for name in ("gamma", "actor_decay"):
+        for name in ("gamma", "kept_from"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: numbers in [0, 1)")
+        if self.averaging_power < 0.0:
+            raise ValueError(f"averaging_power = {self.averaging_power} is not allowed; allowed: numbers >= 0")
         for name in ("train_window", "validation_window", "test_window"):
             begin, end = getattr(self, name)
             if not 0.0 <= begin < end <= 1.0:

@@ -44,6 +44,7 @@ def demonstrate(
     *,
     minimum_displacement: float,
     contact_distance: float,
+    clearance: float,
 ) -> Demonstrations:
     """States of everybody who goes somewhere.
 
@@ -58,6 +59,7 @@ def demonstrate(
         scenario: Gives the time step, limits, goal radius.
         minimum_displacement: Of an expert [m].
         contact_distance: Between the centres of two people who touch [m].
+        clearance: States in which somebody is nearer than this are left out [m].
 
     Returns:
         The demonstrations.
@@ -86,6 +88,8 @@ def demonstrate(
         ends += [absorbing_state(features.size, flag) for flag in ended[ended != 0]]
         under_way[rows[ended != 0]] = False
         rows = rows[ended == 0]
+        gap = np.linalg.norm(crowd.position[k, here] - crowd.position[k, rows][:, None], axis=-1)
+        rows = rows[~((gap < clearance) & apart[np.ix_(rows, here)]).any(axis=1)]
         if rows.size:
             # As a robot's is measured: the turn of the step that led here.
             turn = np.nan_to_num(wrap_angle(crowd.heading[k, rows] - crowd.heading[max(k - 1, 0), rows])) / dt

@@ -16,7 +16,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
 from stable_baselines3.common.noise import ActionNoise
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.optim.swa_utils import AveragedModel
 
 from socialnav_mj.features import FeatureSet
 from socialnav_mj.learning.config import TrainingConfig
@@ -71,9 +71,8 @@ class ReplayIRL(SAC):
             self.reward_net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay, fused=True
         )
         self.replay_buffer.reward_net = self.reward_net
-        average = get_ema_multi_avg_fn(config.actor_decay)  # type: ignore[no-untyped-call]
-        self.average = AveragedModel(self.actor, multi_avg_fn=average)
-        """The actor's moving average: the policy that is validated and kept."""
+        self.average = AveragedModel(self.actor, avg_fn=self._averaged)
+        """The actor's average over the updates: the policy that is validated and kept."""
         self.random = np.random.default_rng(config.seed + 1)
         self.running = experts.running.astype(np.float32)
         self.absorbed = experts.absorbed.astype(np.float32)
@@ -81,6 +80,11 @@ class ReplayIRL(SAC):
         """CPU-bound time spent so far, by kind [s]."""
         self.updates = 0
         """SAC updates so far."""
+
+    def _averaged(self, average: torch.Tensor, actor: torch.Tensor, count: torch.Tensor | int) -> torch.Tensor:
+        """Polynomial-decay average of one more than `count` values, of which the last is the actor's."""
+        power = self.config.averaging_power
+        return average.lerp(actor, (power + 1.0) / (float(count) + 1.0 + power))
 
     def _sample_action(
         self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1

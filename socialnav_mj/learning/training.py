@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -86,6 +86,7 @@ def train(
                 make_scenario(share=1.0),
                 minimum_displacement=config.expert_displacement,
                 contact_distance=config.expert_contact_distance,
+                clearance=config.expert_clearance,
             )
             for recording in training
         ]
@@ -166,6 +167,24 @@ def validate(
     }
 
 
+def is_kept(entry: Mapping[str, Any], history: Sequence[Mapping[str, Any]], config: TrainingConfig) -> bool:
+    """Whether a checkpoint is to be kept instead of an earlier one.
+
+    Args:
+        entry: Its scene_steps, score, success and n_agents.
+        history: Of all earlier checkpoints.
+        config: Of the training.
+
+    Returns:
+        Whether its score is at most one standard error below the best; once a checkpoint is late, of the late ones.
+    """
+    late = config.kept_from * config.scene_steps
+    rivals = [e for e in history if (e["scene_steps"] >= late) == (entry["scene_steps"] >= late)]
+    best = max((*rivals, entry), key=lambda e: e["score"])
+    error = math.sqrt(best["success"] * (1.0 - best["success"]) / best["n_agents"])
+    return bool(entry["score"] >= best["score"] - error)
+
+
 def _claim(folder: Path, config: TrainingConfig) -> None:
     """Write the configuration, or compare it with what is there."""
     wanted = json.loads(json.dumps(config.as_dict()))
@@ -238,7 +257,6 @@ class _Checkpoints(BaseCallback):
         validation = validate(latest, self._recordings, part=config.validation_window, shares=config.validation_shares)
         validation_seconds = perf_counter() - begin
         score = validation["success"] - config.intrusion_weight * validation["intrusion_share"]
-        best = max((entry["score"] for entry in self._history), default=-math.inf)
         counts = np.bincount(self._outcomes, minlength=3) / max(len(self._outcomes), 1)
         entry = {
             "scene_steps": scene_steps,
@@ -250,7 +268,7 @@ class _Checkpoints(BaseCallback):
             "seconds": {**model.seconds, "all": elapsed, "validation": validation_seconds},
         }
         self._outcomes = []
-        if score > best:
+        if is_kept(entry, self._history, config):
             save_policy(model, folder / BEST, {**card, "score": score})
         for name in ("success", "intrusion_share", "time_under_way"):
             model.logger.record(f"validation/{name}", validation[name])
