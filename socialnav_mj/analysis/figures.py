@@ -130,7 +130,7 @@ def draw_sweep(sweep: Mapping[float, LevelTable], table: LevelTable, folder: Pat
     distances = sorted(sweep)
     end = distances[-1] + 1.0
     with style():
-        figure = new_figure(2.7)
+        figure = new_figure(2.9)
         for axes, row in zip(figure.subplots(1, len(rows)), rows, strict=True):
             for k, scenario in enumerate(table.scenarios):
                 found = [
@@ -149,7 +149,7 @@ def draw_sweep(sweep: Mapping[float, LevelTable], table: LevelTable, folder: Pat
             middle = [d for d in distances if float(d).is_integer()]
             axes.set_xticks([0.0, *middle, end], ["PF", *(f"{d:g}" for d in middle), "IRL"])
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+        figure.legend(handles, labels, loc="outside upper center", ncols=2)
         return save(figure, folder, "figure_6_switch_distance")
 
 
