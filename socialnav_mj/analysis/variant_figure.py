@@ -25,7 +25,7 @@ def draw_variants(tables: Mapping[str, LevelTable], titles: Mapping[str, str], f
     scenarios = tables[names[0]].scenarios
     with style():
         figure = new_figure(1.0 + 0.36 * len(names))
-        row = figure.subplots(1, len(scenarios), sharey=True, squeeze=False)[0]
+        row = figure.subplots(1, len(scenarios), sharex=True, sharey=True, squeeze=False)[0]
         for place, (scenario, axes) in enumerate(zip(scenarios, row, strict=True)):
             for k, method in enumerate(METHODS):
                 look = LOOKS[method]
