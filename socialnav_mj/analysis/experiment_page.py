@@ -40,8 +40,8 @@ nothing show what the crowd alone changes.
 _TRAINING = """\
 What the trainings' cards say, with seeds of their own on scenes with 10, 30 and 90 % agents in each part of the \
 recording. Runs that an edge of a part cuts short are easier, so the figures do not compare with those above. The kept \
-checkpoint (ring) has the greatest validation success - {weight} x share. Training collides at wider bodies than \
-evaluation.
+checkpoint (ring) is the last late one whose score, validation success - {weight} x share, is within a standard error \
+of the best. Training collides at wider bodies than evaluation.
 """
 _REWARD = """\
 Learned reward of an agent that drives at 0.8 m/s towards a goal 5 m ahead, with one walker (1 m/s) at each place \
