@@ -66,6 +66,12 @@ def test_states_without_clearance_are_left_out_and_the_run_goes_on():
     assert len(demonstrations(*side_by_side, clearance=0.9).running) == len(demonstrations(*side_by_side).running)
 
 
+def test_experts_who_are_never_clear_are_told():
+    walks = walk([(0.0, 0.0), (6.0, 0.0)], 1.0), walk([(6.0, 0.5), (0.0, 0.5)], 1.0)
+    with pytest.raises(ValueError, match=r"is ever 99\.0 m clear of strangers; there is no state"):
+        demonstrations(*walks, clearance=99.0)
+
+
 def test_companions_do_not_see_each_other_but_see_strangers():
     """Two side by side at 0.2 m have the features of one alone; a stranger ahead is seen by both."""
     pair = walk([(0.0, 0.0), (6.0, 0.0)], 0.8), walk([(0.0, 0.2), (6.0, 0.2)], 0.8)

@@ -65,7 +65,7 @@ def demonstrate(
         The demonstrations.
 
     Raises:
-        ValueError: If nobody moves that far.
+        ValueError: If nobody moves that far, or nobody is ever that clear of strangers.
     """
     dt = scenario.control_timestep
     times = np.arange(int(recording.duration / dt + 1e-6) + 1) * dt
@@ -84,12 +84,12 @@ def demonstrate(
         rows = np.flatnonzero(under_way & crowd.present[k] & crowd.present[k + 1])
         if not rows.size:
             continue
-        ended = _ends(recording, crowd.position[k], here, rows, apart, scenario.goal_radius, contact_distance)
+        nearest = _nearest_stranger(crowd.position[k], here, rows, apart)
+        arrived = np.linalg.norm(recording.end[rows] - crowd.position[k, rows], axis=1) <= scenario.goal_radius
+        ended = np.where(nearest <= contact_distance, COLLISION_FLAG, np.where(arrived, GOAL_FLAG, 0))
         ends += [absorbing_state(features.size, flag) for flag in ended[ended != 0]]
         under_way[rows[ended != 0]] = False
-        rows = rows[ended == 0]
-        gap = np.linalg.norm(crowd.position[k, here] - crowd.position[k, rows][:, None], axis=-1)
-        rows = rows[~((gap < clearance) & apart[np.ix_(rows, here)]).any(axis=1)]
+        rows = rows[(ended == 0) & (nearest >= clearance)]
         if rows.size:
             # As a robot's is measured: the turn of the step that led here.
             turn = np.nan_to_num(wrap_angle(crowd.heading[k, rows] - crowd.heading[max(k - 1, 0), rows])) / dt
@@ -97,25 +97,21 @@ def demonstrate(
                 recording, crowd.position[k], crowd.velocity[k], crowd.heading[k], turn, rows, here, apart, scenario
             )
             running.append(running_state(features(view)))
+    if not running:
+        raise ValueError(
+            f"no expert of recording {recording.name!r} is ever {clearance} m clear of strangers; there is no state"
+        )
     # Whoever was still under way left the scene at its goal.
     ends += [absorbing_state(features.size, GOAL_FLAG) for _ in range(int(under_way.sum()))]
     return Demonstrations(running=np.concatenate(running), absorbed=np.array(ends))
 
 
-def _ends(
-    recording: Recording,
-    position: Array,
-    here: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    apart: NDArray[np.bool_],
-    goal_radius: float,
-    contact_distance: float,
-) -> NDArray[np.int64]:
-    """The flag that each expert's run ends with now, or 0."""
+def _nearest_stranger(
+    position: Array, here: NDArray[np.int64], rows: NDArray[np.int64], apart: NDArray[np.bool_]
+) -> Array:
+    """Distance of each expert to the nearest of those here who is no companion, infinite alone [m]."""
     gap = np.linalg.norm(position[here] - position[rows][:, None], axis=-1)
-    touched = ((gap <= contact_distance) & apart[np.ix_(rows, here)]).any(axis=1)
-    arrived = np.linalg.norm(recording.end[rows] - position[rows], axis=1) <= goal_radius
-    return np.where(touched, COLLISION_FLAG, np.where(arrived, GOAL_FLAG, 0))
+    return np.where(apart[np.ix_(rows, here)], gap, np.inf).min(axis=1)
 
 
 def _view(
