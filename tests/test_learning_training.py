@@ -312,7 +312,7 @@ def test_training_of_500_steps_writes_a_policy_that_acts(killed_and_resumed):
 def test_kill_loses_at_most_one_checkpoint(killed_and_resumed):
     """130 steps are lost, the 200 before are not."""
     _, first, second, _ = killed_and_resumed
-    assert first == list(range(1, 331)) and second == list(range(201, 501))
+    assert first == list(range(331)) and second == list(range(200, 501))
 
 
 def test_what_a_kill_leaves_is_the_checkpoint_as_it_was(killed_and_resumed, tmp_path):
@@ -337,8 +337,8 @@ def test_finished_training_does_nothing_more(killed_and_resumed):
     folder = killed_and_resumed[0]
     before = (folder / "checkpoint.pt").read_bytes()
     steps = []
-    assert train(SMALL, folder, progress=steps.append) == folder / "best.safetensors"
-    assert steps == [] and (folder / "checkpoint.pt").read_bytes() == before
+    assert train(SMALL, folder, progress=lambda p: steps.append(p.scene_steps)) == folder / "best.safetensors"
+    assert steps == [500] and (folder / "checkpoint.pt").read_bytes() == before
 
 
 def test_last_late_checkpoint_within_a_standard_error_of_the_best_is_kept(tmp_path, monkeypatch):
@@ -391,6 +391,8 @@ def test_configuration_goes_through_json():
         ({"kept_from": 1.0}, "kept_from = 1.0 is not allowed; allowed: numbers in [0, 1)"),
         ({"gamma": 1.0}, "gamma = 1.0 is not allowed; allowed: numbers in [0, 1)"),
         ({"averaging_power": -1.0}, "averaging_power = -1.0 is not allowed; allowed: numbers >= 0"),
+        ({"expert_clearance": -0.1}, "expert_clearance = -0.1 is not allowed; allowed: numbers >= 0"),
+        ({"expert_contact_distance": float("nan")}, "expert_contact_distance = nan is not allowed"),
         ({"datasets": ()}, "datasets and shares must not be empty"),
     ],
 )

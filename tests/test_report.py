@@ -234,6 +234,14 @@ def test_damaged_run_file_is_named(run, text):
         report.write_report(run)
 
 
+def test_only_named_episodes_are_read(run):
+    names = [path.name for path in sorted((run / "episodes").glob("*.npz")) if "0.1-" in path.name]
+    table = read_results(run, files=names).agents
+    assert set(table["episode"].to_pylist()) == {*names} and set(table["scenario"].to_pylist()) == {"scenario_1"}
+    with pytest.raises(FileNotFoundError, match=r"episodes.no\.npz is not there, nor are 1 other episodes"):
+        read_results(run, files=[*names, "no.npz", "none.npz"])
+
+
 def test_same_draw_twice_is_refused(run):
     make("potential_field", 0.1, 2).save(run / "episodes" / "copy.npz")
     with pytest.raises(EpisodeError, match=r"copy\.npz and potential_field-0\.1-2\.npz are both draw 2 of made_up"):

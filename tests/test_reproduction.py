@@ -19,7 +19,7 @@ from socialnav_mj.episode import EpisodeError
 from socialnav_mj.reproduction.outputs import PUBLIC, agents_of, write_outputs
 from socialnav_mj.reproduction.plan import DEFAULT, SWEEP, VARIANTS, Experiment, shipped_for
 from socialnav_mj.reproduction.record import publish
-from socialnav_mj.reproduction.study import reproduce, run_folder
+from socialnav_mj.reproduction.study import read_runs, reproduce, run_folder
 
 TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
 
@@ -170,6 +170,14 @@ def test_variants_and_sweep_are_run_and_judged(experiment, tmp_path):
     assert provenance["command"] == "made so"
     assert all(len(facts["sha256"]) == 64 for facts in provenance["policies"].values())
     assert all(run["versions"][0]["mujoco"] for run in provenance["runs"].values())
+
+
+def test_fewer_draws_than_the_folder_holds_are_read_alone(experiment, tmp_path):
+    experiment = replace(experiment, scenarios=("scenario_4",))
+    list(reproduce(experiment, tmp_path, n_jobs=1))
+    for draws in (2, 1):
+        results = read_runs(replace(experiment, draws=draws), tmp_path, n_jobs=1)["default"]
+        assert len(results.sources) == 6 * draws and {s.draw for s in results.sources} == {*range(draws)}
 
 
 def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(experiment, tmp_path):

@@ -161,25 +161,32 @@ def agents_table(episode: Episode, *, file: str = "") -> pa.Table:
     return pa.table(columns, schema=SCHEMA)
 
 
-def read_results(folder: str | Path, *, controllers: Sequence[str] = (), n_jobs: int = 1) -> Results:
-    """Score every episode of a run; one episode at a time is in the memory of each process.
+def read_results(
+    folder: str | Path, *, controllers: Sequence[str] = (), files: Sequence[str] | None = None, n_jobs: int = 1
+) -> Results:
+    """Score the episodes of a run; one episode at a time is in the memory of each process.
 
     Args:
         folder: The run; its episodes are `episodes/*.npz`.
         controllers: Order of the controllers; others follow alphabetically, the human row is always last.
+        files: Names of the episodes to read; all by default.
         n_jobs: Processes that read.
 
     Returns:
         Rows ordered by dataset, share, scenario, controller, draw and agent.
 
     Raises:
-        FileNotFoundError: If there is no episode.
+        FileNotFoundError: If there is no episode, or a named one is not there.
         EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, or if episodes that
             would be averaged or compared differ in their configuration; the files are named.
     """
-    paths = sorted((Path(folder) / "episodes").glob("[!.]*.npz"))  # not what an interruption left
+    episodes = Path(folder) / "episodes"
+    there = sorted(episodes.glob("[!.]*.npz"))  # not what an interruption left
+    paths = there if files is None else sorted(episodes / name for name in files)
     if not paths:
-        raise FileNotFoundError(f"no episodes in {Path(folder) / 'episodes'}; expected *.npz files")
+        raise FileNotFoundError(f"no episodes in {episodes}; expected *.npz files")
+    if missing := sorted({*paths} - {*there}):
+        raise FileNotFoundError(f"{missing[0]} is not there, nor are {len(missing) - 1} other episodes")
     read = list(in_processes(_read, [(path,) for path in paths], n_jobs=n_jobs))
     places = {name: place for place, name in enumerate(controllers)}
 

@@ -118,8 +118,19 @@ class TrainingConfig:
         for name in ("gamma", "kept_from"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: numbers in [0, 1)")
-        if self.averaging_power < 0.0:
-            raise ValueError(f"averaging_power = {self.averaging_power} is not allowed; allowed: numbers >= 0")
+        for name in (
+            "averaging_power",
+            "guide_noise",
+            "gradient_penalty",
+            "output_penalty",
+            "weight_decay",
+            "expert_displacement",
+            "expert_contact_distance",
+            "expert_clearance",
+            "intrusion_weight",
+        ):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: numbers >= 0")
         for name in ("train_window", "validation_window", "test_window"):
             begin, end = getattr(self, name)
             if not 0.0 <= begin < end <= 1.0:

@@ -63,7 +63,7 @@ def train(
         config: Must equal the folder's, if it holds a training.
         folder: Gets config.json, checkpoint.pt, buffer.npz, history.json, best.safetensors, best.json and tensorboard/.
         data_dir: Where recordings are looked for first.
-        progress: Called after every scene step.
+        progress: Called at the start, then after every scene step.
 
     Returns:
         Path of the best policy's weights.
@@ -109,6 +109,9 @@ def train(
     if stored is not None:
         with np.load(folder / BUFFER, allow_pickle=False) as buffer:
             model.restore(stored["model"], dict(buffer))
+    if progress is not None:
+        done = model.num_timesteps // env.num_envs
+        progress(Progress(scene_steps=done, transitions=model.replay_buffer.size(), validation=None))
     left = config.scene_steps * env.num_envs - model.num_timesteps
     if left > 0:
         callback = _Checkpoints(config, folder, recordings, history, progress)

@@ -107,7 +107,7 @@ def _in_turn(started: list[Iterator[Done]]) -> Iterator[Done]:
 
 
 def read_runs(study: Study, out: Path, *, n_jobs: int = -1) -> dict[str, Results]:
-    """Read and score the episodes of a study.
+    """Read and score the episodes of a study, and none that its folder holds of more draws or other controllers.
 
     Args:
         study: That was run by `reproduce`.
@@ -118,7 +118,12 @@ def read_runs(study: Study, out: Path, *, n_jobs: int = -1) -> dict[str, Results
         Name of the run: its results.
 
     Raises:
-        FileNotFoundError: If a run has no episodes.
+        FileNotFoundError: If a run lacks an episode.
         EpisodeError: If an episode is damaged or does not fit the others.
     """
-    return {run.name: read_results(run_folder(out, run.name), n_jobs=n_jobs) for run in study.runs()}
+    return {
+        run.name: read_results(
+            run_folder(out, run.name), files=[job.file_name for job in jobs_of(run.evaluation)], n_jobs=n_jobs
+        )
+        for run in study.runs()
+    }
