@@ -186,7 +186,7 @@ def read_results(
     if not paths:
         raise FileNotFoundError(f"no episodes in {episodes}; expected *.npz files")
     if missing := sorted({*paths} - {*there}):
-        raise FileNotFoundError(f"{missing[0]} is not there, nor are {len(missing) - 1} other episodes")
+        raise FileNotFoundError(f"{len(missing)} of {len(paths)} episodes are not there, the first is {missing[0]}")
     read = list(in_processes(_read, [(path,) for path in paths], n_jobs=n_jobs))
     places = {name: place for place, name in enumerate(controllers)}
 

@@ -81,6 +81,11 @@ class ReplayIRL(SAC):
         self.updates = 0
         """SAC updates so far."""
 
+    @property
+    def scene_steps(self) -> int:
+        """Control steps of the training scene so far; SB3 counts one for every slot."""
+        return self.num_timesteps // self.n_envs
+
     def _averaged(self, average: torch.Tensor, actor: torch.Tensor, count: torch.Tensor | int) -> torch.Tensor:
         """Polynomial-decay average of one more than `count` values, of which the last is the actor's."""
         power = self.config.averaging_power

@@ -110,12 +110,11 @@ def train(
         with np.load(folder / BUFFER, allow_pickle=False) as buffer:
             model.restore(stored["model"], dict(buffer))
     if progress is not None:
-        done = model.num_timesteps // env.num_envs
-        progress(Progress(scene_steps=done, transitions=model.replay_buffer.size(), validation=None))
-    left = config.scene_steps * env.num_envs - model.num_timesteps
+        progress(Progress(scene_steps=model.scene_steps, transitions=model.replay_buffer.size(), validation=None))
+    left = config.scene_steps - model.scene_steps
     if left > 0:
         callback = _Checkpoints(config, folder, recordings, history, progress)
-        model.learn(left, callback=callback, reset_num_timesteps=False, log_interval=1)
+        model.learn(left * env.num_envs, callback=callback, reset_num_timesteps=False, log_interval=1)
     _complete_card(folder / BEST, config, recordings, history)
     return folder / BEST
 
@@ -229,7 +228,7 @@ class _Checkpoints(BaseCallback):
         """
         model = self.model
         assert isinstance(model, ReplayIRL)
-        scene_steps = model.num_timesteps // model.n_envs
+        scene_steps = model.scene_steps
         self._outcomes += [info["outcome"] for info in self.locals["infos"] if "outcome" in info]
         validation = None
         if scene_steps % self._config.checkpoint_every == 0 or scene_steps == self._config.scene_steps:
