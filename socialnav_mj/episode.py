@@ -1,5 +1,6 @@
 """The record of everything that happened in one episode; all that comes later is made from it alone."""
 
+import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,9 @@ from socialnav_mj.files import written_whole
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-FORMAT = "socialnav_mj.episode/1"
+FORMAT = "socialnav_mj.episode/2"
+MAX_BYTES = 1 << 30
+"""An episode file whose arrays are larger is not read: a small file can ask for any amount of memory."""
 
 
 class Outcome(IntEnum):
@@ -248,13 +251,16 @@ class Episode:
         """
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("policies", "metadata")}
         header = {"format": FORMAT, "policies": list(self.policies), "metadata": self.metadata}
+        header["digest"] = _digest(arrays, header)
         with written_whole(path) as part:
             np.savez_compressed(part, header=np.array(json.dumps(header)), **arrays)
         return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> "Episode":
-        """Read an episode; never runs code from the file.
+        """Read an episode; never runs code from the file, and refuses one that was altered after `save`.
+
+        The digest in its header is no signature: who alters a file can write another one. `verification` tells.
 
         Args:
             path: An npz file written by `save`.
@@ -273,7 +279,10 @@ class Episode:
             if unknown := set(file.files) - expected - {"header"}:
                 raise EpisodeError(f"it has unknown arrays {', '.join(sorted(unknown))}")
             arrays = {name: file[name] for name in expected}
-            return cls(**arrays, policies=tuple(header["policies"]), metadata=header["metadata"])
+            episode = cls(**arrays, policies=tuple(header["policies"]), metadata=header["metadata"])
+            if header.get("digest") != _digest(arrays, header):
+                raise EpisodeError("it was altered after it was written: its contents do not have the header's digest")
+            return episode
 
 
 def read_header(path: str | Path) -> dict[str, Any]:
@@ -283,7 +292,7 @@ def read_header(path: str | Path) -> dict[str, Any]:
         path: An npz file written by `Episode.save`.
 
     Returns:
-        format, policies, metadata.
+        format, policies, metadata, digest.
 
     Raises:
         FileNotFoundError: If there is no such file.
@@ -300,15 +309,33 @@ def _reading(path: str | Path) -> Iterator[tuple[Any, dict[str, Any]]]:
         with np.load(path, allow_pickle=False) as file:
             if not hasattr(file, "files") or "header" not in file.files:
                 raise EpisodeError("it has no header")
+            if (size := sum(member.file_size for member in file.zip.infolist())) > MAX_BYTES:
+                raise EpisodeError(f"its arrays take {size} bytes; allowed: up to {MAX_BYTES}")
             header = json.loads(str(file["header"]))
             if header.get("format") != FORMAT:
                 raise EpisodeError(f"its format is {header.get('format')!r}; this version reads {FORMAT!r}")
+            if not isinstance(header.get("metadata"), dict) or not _are_names(header.get("policies")):
+                raise EpisodeError("its header lacks metadata (an object) or policies (a list of names)")
             yield file, header
     except FileNotFoundError:
         raise
     except Exception as error:
         # Damage makes zipfile, zlib and numpy raise nearly anything, NotImplementedError and struct.error included.
         raise EpisodeError(f"{path} is not a readable episode: {error}") from error
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+def _digest(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> str:
+    """SHA-256 of all that an episode says: its arrays with names, types and shapes, its policies and metadata."""
+    said = {key: header[key] for key in ("policies", "metadata")}
+    digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode())
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def _is_finite_where(values: Array, expected: NDArray[np.bool_]) -> bool:

@@ -185,10 +185,10 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
         _scenario(evaluation, scenario, evaluation.seed)
     configurations = _controller_configurations(evaluation.controllers)
     _check_folder(folder / "episodes", jobs, recording, configurations)
-    write_whole(
-        folder / "run.json",
-        (json.dumps({"command": command, "controllers": [*configurations]}, indent=1) + "\n").encode(),
-    )
+    # Episodes of earlier commands belong to the run as well: they are in its tables.
+    episodes = sorted({job.file_name for job in jobs} | {path.name for path in (folder / "episodes").glob("[!.]*.npz")})
+    run = {"command": command, "controllers": [*configurations], "episodes": episodes}
+    write_whole(folder / "run.json", (json.dumps(run, indent=1) + "\n").encode())
     return _run_all(jobs, folder / "episodes", n_jobs)
 
 

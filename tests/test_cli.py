@@ -96,6 +96,7 @@ def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(c
     assert json.loads((folder / "run.json").read_text()) == {
         "command": "socialnav-mj 'as it was typed'",
         "controllers": ["potential_field", "go_straight", "human"],
+        "episodes": sorted(path.name for path in (folder / "episodes").glob("*.npz")),
     }
     written = (folder / "report.md").read_bytes()
     main(["report", "runs/tiny", "--jobs", "1"])

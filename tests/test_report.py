@@ -46,7 +46,8 @@ def template(tmp_path_factory):
         for share in (0.9, 0.1):
             for draw in range(4):
                 make(controller, share, draw).save(folder / "episodes" / f"{controller}-{share}-{draw}.npz")
-    (folder / "run.json").write_text(json.dumps({"command": "socialnav-mj evaluate", "controllers": ["zigzag"]}))
+    run = {"command": "socialnav-mj evaluate", "controllers": ["zigzag"], "episodes": []}
+    (folder / "run.json").write_text(json.dumps(run))
     return folder
 
 
@@ -230,7 +231,7 @@ def test_folder_without_episodes_is_refused(tmp_path):
 @pytest.mark.parametrize("text", ["{", "[]", '{"command": 1, "controllers": []}', '{"command": "x"}'])
 def test_damaged_run_file_is_named(run, text):
     (run / "run.json").write_text(text)
-    with pytest.raises(ValueError, match=r"run\.json.*command"):
+    with pytest.raises(ValueError, match=r"run\.json"):
         report.write_report(run)
 
 

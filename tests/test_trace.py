@@ -211,7 +211,7 @@ def test_properties_identify_the_run(episode: Episode, path: Path) -> None:
     assert json.loads(run["configuration"][0]) == episode.metadata
     text = static["/run"]["TextDocument:text"][0]
     assert "**1 of 4 robots succeeded**" in text
-    assert json.dumps(episode.metadata, indent=1) in text
+    assert json.dumps(episode.metadata, indent=1, sort_keys=True) in text
 
 
 def test_blueprint_names_every_kind_of_view(path: Path) -> None:

@@ -5,7 +5,7 @@ import io
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from socialnav_mj.files import write_whole
 
 SUMMARY_FORMAT = "socialnav_mj.summary/1"
 RUN_FILE = "run.json"
-"""Written beside the episodes by whoever made them: {"command": "...", "controllers": ["in", "their", "order"]}."""
+"""Written beside the episodes by whoever made them; see `RunFile`."""
 _FIGURE = "figures/paired_humans"
 
 _COLUMNS = (
@@ -81,6 +81,18 @@ name; Hall's *personal* distance), per agent; **share** is over all steps under 
 """
 
 
+@dataclass(frozen=True, kw_only=True)
+class RunFile:
+    """What run.json says of the episodes beside it."""
+
+    command: str
+    """That made them."""
+    controllers: tuple[str, ...]
+    """Their order in tables."""
+    episodes: tuple[str, ...]
+    """Names of all files that belong to the run."""
+
+
 def write_report(folder: str | Path, *, console: Console | None = None, n_jobs: int = 1) -> Path:
     """Make everything in a run folder again, except its episodes.
 
@@ -101,26 +113,12 @@ def write_report(folder: str | Path, *, console: Console | None = None, n_jobs: 
         ValueError: If run.json is not what is expected.
     """
     folder = Path(folder)
-    command, controllers = _read_run_file(folder / RUN_FILE)
-    results = read_results(folder, controllers=controllers, n_jobs=n_jobs)
+    run = read_run_file(folder / RUN_FILE)
+    results = _results(folder, run, n_jobs)
     estimates = summarise(results.agents)
     differences = paired_differences(results.agents)
-    summary = _summary(results, estimates, command)
-    sections = [
-        *paired_section(differences, f"{_FIGURE}.svg"),
-        *fault_section(results.agents, results.contacts, results.overlaps),
-        *severity_section(results.contacts),
-        *draws_section(resolutions(results.agents)),
-    ]
-    files = {
-        "agents.parquet": _parquet(results.agents),
-        "tables/collisions.parquet": _parquet(results.contacts),
-        "tables/paired.csv": _csv(differences).encode(),
-        **{f"{_FIGURE}.{kind}": content for kind, content in paired_figure(differences).items()},
-        "summary.csv": _csv(estimates).encode(),
-        "summary.json": (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode(),
-        "report.md": _markdown(summary, estimates, sections).encode(),
-    }
+    files = _tables(run, results, estimates, differences)
+    files |= {f"{_FIGURE}.{kind}": content for kind, content in paired_figure(differences).items()}
     for name, content in files.items():
         write_whole(folder / name, content)
     _write_traces(folder, results.sources)
@@ -128,6 +126,50 @@ def write_report(folder: str | Path, *, console: Console | None = None, n_jobs: 
         for table in terminal_tables(estimates):
             console.print(table)
     return folder / "report.md"
+
+
+def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
+    """The tables that `write_report` makes of the episodes of a run, without writing them.
+
+    Args:
+        folder: See `write_report`.
+        n_jobs: Processes that read episodes.
+
+    Returns:
+        Content by name of the file in the folder.
+
+    Raises:
+        FileNotFoundError: If there is no episode.
+        EpisodeError: See `write_report`.
+        ValueError: If run.json is not what is expected.
+    """
+    run = read_run_file(Path(folder) / RUN_FILE)
+    results = _results(Path(folder), run, n_jobs)
+    return _tables(run, results, summarise(results.agents), paired_differences(results.agents))
+
+
+def _results(folder: Path, run: RunFile | None, n_jobs: int) -> Results:
+    return read_results(folder, controllers=() if run is None else run.controllers, n_jobs=n_jobs)
+
+
+def _tables(
+    run: RunFile | None, results: Results, estimates: Sequence[Estimate], differences: Sequence[Estimate]
+) -> dict[str, bytes]:
+    summary = _summary(results, estimates, None if run is None else run.command)
+    sections = [
+        *paired_section(differences, f"{_FIGURE}.svg"),
+        *fault_section(results.agents, results.contacts, results.overlaps),
+        *severity_section(results.contacts),
+        *draws_section(resolutions(results.agents)),
+    ]
+    return {
+        "agents.parquet": _parquet(results.agents),
+        "tables/collisions.parquet": _parquet(results.contacts),
+        "tables/paired.csv": _csv(differences).encode(),
+        "summary.csv": _csv(estimates).encode(),
+        "summary.json": (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode(),
+        "report.md": _markdown(summary, estimates, sections).encode(),
+    }
 
 
 def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
@@ -283,17 +325,33 @@ def _parquet(table: pa.Table) -> bytes:
     return bytes(sink.getvalue().to_pybytes())
 
 
-def _read_run_file(path: Path) -> tuple[str | None, list[str]]:
+def read_run_file(path: Path) -> RunFile | None:
+    """Read run.json.
+
+    Args:
+        path: The file.
+
+    Returns:
+        What it says; None if there is no such file.
+
+    Raises:
+        ValueError: If it is not what is expected; says what is.
+    """
     if not path.exists():
-        return None, []
+        return None
     try:
-        run = json.loads(path.read_text())
-        command, controllers = run["command"], run["controllers"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f'{path} is not JSON with "command" and "controllers": {error!r}') from error
-    if not isinstance(command, str) or not isinstance(controllers, list):
-        raise ValueError(f'{path}: "command" must be a string and "controllers" a list; given {run}')
-    return command, controllers
+        run = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path} is not JSON: {error}") from error
+    lists = ("controllers", "episodes")
+    if (
+        not isinstance(run, dict)
+        or not isinstance(run.get("command"), str)
+        or not all(isinstance(run.get(key), list) and all(isinstance(v, str) for v in run[key]) for key in lists)
+    ):
+        expected = '{"command": a string, "controllers": [names in their order], "episodes": [names of files]}'
+        raise ValueError(f"{path}: expected {expected}; given {str(run)[:200]}")
+    return RunFile(command=run["command"], controllers=tuple(run["controllers"]), episodes=tuple(run["episodes"]))
 
 
 def _write_traces(folder: Path, sources: Sequence[Source]) -> None:

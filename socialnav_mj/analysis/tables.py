@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+import tasks
 from socialnav_mj.analysis.contact_table import contacts_table
 from socialnav_mj.analysis.paired import HUMAN, HUMAN_COLUMNS, pair_with_humans
 from socialnav_mj.episode import Episode, EpisodeError, Partner
@@ -81,7 +82,7 @@ the file the row comes from, `first_partner` is "pedestrian", "agent" or null, `
 that the agent replaced (null until paired, or if the run has no human row of that draw)."""
 
 _METADATA = ("controller", "controller_config", "scenario", "scenario_name", "draw", "recording", "state_hash")
-_RECORDING = ("name", "variant", "checksum")
+_PARTS = {"recording": ("name", "variant", "checksum"), "scenario": ("seed", "share")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,9 +132,10 @@ def agents_table(episode: Episode, *, file: str = "") -> pa.Table:
         Columns of `SCHEMA`, rows in the order of the agents.
 
     Raises:
-        EpisodeError: If the metadata lack a key that is needed.
+        EpisodeError: If the metadata lack a key that is needed, or contradict themselves.
     """
-    source = Source(file=file, metadata=_checked_metadata(episode))
+    check_names(episode.metadata)
+    source = Source(file=file, metadata=episode.metadata)
     dataset, variant, scenario, controller = source.group
     n = episode.n_agents
     metrics = per_agent(episode)
@@ -227,13 +229,30 @@ def _read(path: Path) -> tuple[Source, pa.Table, pa.Table, float]:
         raise EpisodeError(f"{path} cannot be scored: {error}") from error
 
 
-def _checked_metadata(episode: Episode) -> dict[str, Any]:
-    metadata = episode.metadata
+def check_names(metadata: dict[str, Any]) -> None:
+    """Draw and scenario by which an episode is filed are those that it was run with.
+
+    Args:
+        metadata: Of an episode.
+
+    Raises:
+        EpisodeError: If something is missing or contradicts the scenario's configuration.
+    """
     missing = [key for key in _METADATA if key not in metadata]
-    missing += [f"recording.{key}" for key in _RECORDING if key not in metadata.get("recording", {})]
+    for key, parts in _PARTS.items():
+        given = metadata.get(key)
+        missing += [f"{key}.{part}" for part in parts if not isinstance(given, dict) or part not in given]
     if missing:
         raise EpisodeError(f"its metadata lack {', '.join(missing)}; there are {', '.join(sorted(metadata))}")
-    return metadata
+    scenario = metadata["scenario"]
+    if metadata["draw"] != scenario["seed"]:
+        raise EpisodeError(f"it calls itself draw {metadata['draw']!r}, but its scenario has seed {scenario['seed']!r}")
+    share = tasks.SHARES.get(metadata["scenario_name"], scenario["share"])
+    if share != scenario["share"]:
+        raise EpisodeError(
+            f"it calls itself {metadata['scenario_name']!r}, which replaces a share of {share} of the people, but its "
+            f"scenario replaces {scenario['share']!r}"
+        )
 
 
 def scenario_configuration(source: Source) -> dict[str, Any]:

@@ -152,7 +152,7 @@ def _summary(episode: Episode, name: str, chosen: Index) -> str:
             "## Configuration",
             f"state `{metadata['state_hash'][:16]}`, recording `{str(recording['checksum'])[:16]}`",
             "```json",
-            json.dumps(metadata, indent=1),
+            json.dumps(metadata, indent=1, sort_keys=True),
             "```",
         ]
     )

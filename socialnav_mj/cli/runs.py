@@ -4,7 +4,7 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.table import Table
@@ -12,6 +12,9 @@ from rich.table import Table
 from socialnav_mj.cli.arguments import Folder, Name, Scenarios
 from socialnav_mj.cli.console import console, counted_progress, errors, follow, say
 from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
+
+if TYPE_CHECKING:
+    from socialnav_mj.verification import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,40 +99,49 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Verify:
-    """Run stored episodes again and compare the hashes of their states; exit code 1 if one differs."""
+    """Run stored episodes again and compare everything that they say; exit code 1 if something differs."""
 
     path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
     """Folder of `evaluate`, an episode (.npz), or a trace (.rrd)."""
     dataset: Name = None
-    """Name or path of the recording; by default the name that each file gives."""
+    """Name or path of the recording; by default the one in the catalogue that each file names."""
     data_dir: Folder = None
     """Where recordings are looked for first."""
+    trust: tuple[str, ...] = ()
+    """package.module:Class of controllers that the files may have run; importing them runs their code. Built-in
+    controllers and those of installed packages need none."""
+    trust_robot: tuple[Path, ...] = ()
+    """MJCF files of robots, outside of the package's assets, that the files may name."""
     jobs: int = -1
     """Processes; -1 for one a core."""
 
     def run(self) -> None:
         """Verify."""
-        from socialnav_mj.verification import files_of, verify
+        from socialnav_mj.verification import Trust, files_of, verify
 
-        total, wrong = len(files_of(self.path)), 0
+        data_dir = None if self.data_dir is None else str(self.data_dir)
+        trust = Trust(controllers=self.trust, robots=self.trust_robot)
+        checked, wrong = 0, 0
         with counted_progress() as progress:
-            bar = progress.add_task("files", total=total)
-            data_dir = None if self.data_dir is None else str(self.data_dir)
-            for verdict in verify(self.path, dataset=self.dataset, data_dir=data_dir, n_jobs=self.jobs):
+            bar = progress.add_task("files", total=len(files_of(self.path)))
+            for verdict in verify(self.path, dataset=self.dataset, data_dir=data_dir, trust=trust, n_jobs=self.jobs):
                 progress.advance(bar)
-                wrong += not verdict.same
-                if verdict.error is not None:
-                    result = verdict.error
-                elif verdict.same:
-                    result = f"same {verdict.hash[:16]}"
-                else:
-                    result = f"DIFFERS: stored {verdict.stored_hash[:16]}, now {verdict.hash[:16]}"
-                    if verdict.other_versions:
-                        result += f" (then and now: {'; '.join(verdict.other_versions)})"
-                say(f"{verdict.path.name}: {result}")
-        say(f"{total - wrong} of {total} files give the same states again")
+                checked, wrong = checked + 1, wrong + (not verdict.same)
+                say(f"{verdict.path.name}: {_told(verdict)}")
+        say(f"{checked - wrong} of {checked} files say what their re-simulation says")
         if wrong:
             sys.exit(1)
+
+
+def _told(verdict: "Verdict") -> str:
+    if verdict.error is not None:
+        return verdict.error
+    if verdict.same:
+        return f"same {verdict.state_hash[:16]}".rstrip()
+    result = f"DIFFERS: {'; '.join(verdict.differences)}"
+    if verdict.other_versions:
+        result += f" (then and now: {'; '.join(verdict.other_versions)})"
+    return result
 
 
 @dataclass(frozen=True, kw_only=True)

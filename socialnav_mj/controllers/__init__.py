@@ -2,13 +2,16 @@
 
 import ast
 import json
-from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Collection
+from dataclasses import Field, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any
+from operator import attrgetter
+from typing import Any, get_type_hints
 
-from socialnav_mj.controllers.base import Controller, Limits, Observation, TwistController
+from typeguard import TypeCheckError, check_type
+
+from socialnav_mj.controllers.base import NAMES_CONTROLLER, Controller, Limits, Observation, TwistController
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.potential_field import PotentialField
@@ -51,7 +54,7 @@ def make_controller(spec: str) -> Controller:
     """
     name, config = _parse(spec)
     factory = _factory(name)
-    if config and is_dataclass(factory) and "name" in {field.name for field in fields(factory)}:
+    if config and "name" in {field.name for field in _fields(factory)}:
         config.setdefault("name", spec)
     try:
         controller = factory(**config)
@@ -89,6 +92,18 @@ def with_policy_of(spec: str, dataset: str) -> str:
     return f"{name}({', '.join(f'{key}={value!r}' for key, value in (config | found).items())})"
 
 
+def class_path(kind: type) -> str:
+    """How a class is named in files and on the command line.
+
+    Args:
+        kind: Any class.
+
+    Returns:
+        "package.module:Class".
+    """
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
 def controller_config(controller: Controller) -> dict[str, Any]:
     """Configuration of a controller as it travels in every episode.
 
@@ -102,9 +117,8 @@ def controller_config(controller: Controller) -> dict[str, Any]:
         ValueError: If a field is no JSON value.
     """
     kind = type(controller)
-    result: dict[str, Any] = {"class": f"{kind.__module__}:{kind.__qualname__}"}
-    names: list[str] = [field.name for field in fields(controller) if field.init] if is_dataclass(controller) else []
-    for name in names:
+    result: dict[str, Any] = {"class": class_path(kind)}
+    for name in (field.name for field in _fields(kind)):
         value = getattr(controller, name)
         try:
             result[name] = json.loads(json.dumps(value, allow_nan=False))
@@ -113,24 +127,84 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     return result
 
 
-def controller_of(config: dict[str, Any]) -> Controller:
-    """Inverse of `controller_config`.
+def controller_of(config: dict[str, Any], *, trusted: Collection[str] = ()) -> Controller:
+    """Inverse of `controller_config`, for configurations that come from a file.
+
+    Nothing that it names is imported or called unless it is built in, offered by an installed package, or trusted by
+    whoever asks.
 
     Args:
         config: As it travels in an episode.
+        trusted: Classes outside of those, as "package.module:Class".
 
     Returns:
         A new controller of the same class and configuration.
 
     Raises:
-        ValueError: If the class cannot be imported or does not take the configuration.
+        ValueError: If the class is unknown and not trusted, is no controller, or does not take the configuration.
     """
+    if not isinstance(config, dict) or not isinstance(config.get("class"), str):
+        raise ValueError(f'controller_config = {config!r} is not allowed; allowed: a JSON object with "class"')
     values = dict(config)
-    name = str(values.pop("class", ""))
+    path = values.pop("class")
+    kind = _known_class(path, trusted)
+    _check_values(path, kind, values, trusted)
     try:
-        return _load(name, name)(**values)
+        return kind(**values)
     except TypeError as error:
-        raise ValueError(f"controller {name!r} cannot be made with {values}: {error}") from error
+        raise ValueError(f"controller {path!r} cannot be made with {values}: {error}") from error
+
+
+def _known_class(path: str, trusted: Collection[str]) -> Callable[..., Controller]:
+    offered = [*BUILT_IN.values(), *(_load(entry.name, entry.value) for entry in entry_points(group=ENTRY_POINT_GROUP))]
+    for factory in offered:
+        if isinstance(factory, type) and class_path(factory) == path:
+            return factory
+    if path not in trusted:
+        raise ValueError(_untrusted(path))
+    kind = _load(path, path)
+    lacking = [name for name in ("reset", "act") if not callable(getattr(kind, name, None))]
+    if not isinstance(kind, type) or lacking:
+        raise ValueError(f"{path!r} is no controller: expected a class with reset and act")
+    return kind
+
+
+def _fields(kind: Callable[..., Controller]) -> list[Field[Any]]:
+    """Settings of a class: none if it is no dataclass."""
+    return [field for field in fields(kind) if field.init] if is_dataclass(kind) else []
+
+
+def _untrusted(path: str) -> str:
+    return (
+        f"the file names the controller {path!r}, which is neither built in nor offered by an installed package; "
+        f"importing it runs its code. If you trust that code, add --trust {path}"
+    )
+
+
+def _check_values(path: str, kind: Callable[..., Controller], values: dict[str, Any], trusted: Collection[str]) -> None:
+    """Settings that a file gives are those that the class has, of their types, and name nothing untrusted either."""
+    allowed = {field.name: field for field in _fields(kind)}
+    hints = get_type_hints(kind) if allowed else {}
+    for name, value in values.items():
+        if name not in allowed:
+            known = ", ".join(allowed) or "none"
+            raise ValueError(f"controller {path!r} has no setting {name!r}; allowed: {known}")
+        try:
+            check_type(value, hints[name])
+        except TypeCheckError as error:
+            raise ValueError(f"controller {path!r}: {name} = {value!r} is not allowed: {error}") from error
+        if allowed[name].metadata.get(NAMES_CONTROLLER):
+            _check_trusted_spec(value, trusted)
+
+
+def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
+    name, config = _parse(spec)
+    if ":" in name and name not in trusted:
+        raise ValueError(_untrusted(name))
+    factory = _factory(name)
+    for field in _fields(factory):
+        if field.metadata.get(NAMES_CONTROLLER) and field.name in config:
+            _check_trusted_spec(config[field.name], trusted)
 
 
 def _parse(spec: str) -> tuple[str, dict[str, Any]]:
@@ -163,7 +237,7 @@ def _factory(name: str) -> Callable[..., Controller]:
 def _load(name: str, path: str) -> Callable[..., Controller]:
     module_name, _, attribute = path.partition(":")
     try:
-        factory: Callable[..., Controller] = getattr(import_module(module_name), attribute)
+        factory: Callable[..., Controller] = attrgetter(attribute)(import_module(module_name))
     except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise ValueError(
             f"controller {name!r} cannot be imported from {path!r}: {error}; expected package.module:Class"
@@ -180,6 +254,7 @@ __all__ = [
     "Observation",
     "TwistController",
     "available",
+    "class_path",
     "controller_config",
     "controller_of",
     "make_controller",

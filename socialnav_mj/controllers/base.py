@@ -13,6 +13,9 @@ from socialnav_mj.geometry import Array, wheel_speed_of_twist
 
 Observation = Mapping[str, NDArray[Any]]
 
+NAMES_CONTROLLER = "names_controller"
+"""Key in the metadata of a dataclass field whose value names another controller, as `make_controller` takes it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.controllers.base import Limits, Observation, TwistController
+from socialnav_mj.controllers.base import NAMES_CONTROLLER, Limits, Observation, TwistController
 from socialnav_mj.geometry import Array
 
 Who = Literal["pedestrians", "anyone"]
@@ -40,9 +40,9 @@ class Hybrid(TwistController):
     that is the default. At exactly the switch distance `far` acts: the paper says "below".
     """
 
-    near: str = "replay_irl"
+    near: str = field(default="replay_irl", metadata={NAMES_CONTROLLER: True})
     """Controller near people, as `make_controller` takes it."""
-    far: str = "potential_field"
+    far: str = field(default="potential_field", metadata={NAMES_CONTROLLER: True})
     """Controller elsewhere."""
     switch_distance: float = 2.0
     """[m]"""
