@@ -62,7 +62,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
     Returns:
         The cost.
     """
-    from socialnav_mj.analysis.trace import write_trace  # rerun is slow to import and not needed elsewhere
+    from socialnav_mj.trace.writer import write_trace  # rerun is slow to import and not needed elsewhere
 
     environment = tasks.load(scenario, {"dataset": recording, "seed": seed})
     states = _record_states(environment, controller)

@@ -12,8 +12,6 @@ import pyarrow as pa
 import pyarrow.parquet
 
 import tasks
-from socialnav_mj.analysis.report import RUN_FILE, read_run_file, report_tables
-from socialnav_mj.analysis.tables import check_names
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_of
 from socialnav_mj.environment import build_environment
@@ -22,6 +20,8 @@ from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.catalogue import catalogue
+from socialnav_mj.report.agents import check_names
+from socialnav_mj.report.writer import RUN_FILE, read_run_file, report_tables
 from socialnav_mj.resources import assets_folder
 from socialnav_mj.rollout import package_versions, rollout
 
@@ -134,8 +134,8 @@ def _verify_episode(path: Path, dataset: str | None, data_dir: str | None, trust
 
 
 def _verify_trace(path: Path, dataset: str | None, data_dir: str | None, trust: Trust) -> Verdict:
-    from socialnav_mj.analysis.trace import read_metadata, write_trace  # rerun is slow to import
-    from socialnav_mj.analysis.trace_columns import differing_columns
+    from socialnav_mj.trace.columns import differing_columns
+    from socialnav_mj.trace.writer import read_metadata, write_trace  # rerun is slow to import
 
     metadata = read_metadata(path)
     again = resimulate(metadata, dataset=dataset, data_dir=data_dir, trust=trust)

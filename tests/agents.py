@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from socialnav_mj.analysis.panel import HUMAN, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry
-from socialnav_mj.analysis.tables import SCHEMA
+from socialnav_mj.report.agents import SCHEMA
+from socialnav_mj.studies.panel import HUMAN, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry
 
 SHARES = {"scenario_1": 0.1, "scenario_2": 0.3, "scenario_3": 0.7, "scenario_4": 0.9}
 
@@ -82,7 +82,7 @@ def experiment_table(
         scenarios: Names of tasks.
 
     Returns:
-        Columns of `tables.SCHEMA`.
+        Columns of `agents.SCHEMA`.
     """
     random = np.random.default_rng(1)
     names = {e.controller: e.controller.rstrip("0123456789") for e in roster_of(trainings)}

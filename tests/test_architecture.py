@@ -12,8 +12,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("socialnav_mj", "tasks")
 
-# Top to bottom: a room may import from its own row and from the rows above it. `episode` stands above the simulator
-# although it is filled after it: it is a record of numpy arrays, and physics and task share its Outcome and Partner.
+# Top to bottom: a room may import from its own row and from the rows above it; `studies.paper` is a room of its own.
+# `episode` stands above the simulator although it is filled after it: it is a record of numpy arrays, and physics and
+# task share its Outcome and Partner.
 ROWS = (
     {"resources", "geometry", "config", "files", "processes"},
     {"recordings"},
@@ -23,11 +24,15 @@ ROWS = (
     {"controllers"},
     {"rollout", "human", "evaluation"},
     {"metrics"},
-    {"analysis"},
+    {"trace"},
+    {"report"},
     {"learning"},
-    {"reproduction"},
+    {"studies"},
+    {"studies.paper", "studies.leave_one_out"},
     {"benchmark", "verification", "cli"},
 )
+# A study uses what all studies share, and no other study.
+STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}
 # Controllers own no simulator: most rows above are closed to them.
 CONTROLLERS_MAY_IMPORT = {"resources", "geometry", "config", "observation", "features", "controllers"}
 # `socialnav_mj.load` imports `tasks` when it is called.
@@ -37,8 +42,8 @@ EXCEPTIONS = {("socialnav_mj", "tasks")}
 ONLY_IN = {
     "mujoco": {"scene", "physics", "task", "environment", "tasks", "benchmark"},
     "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "benchmark", "cli", "socialnav_mj"},
-    "matplotlib": {"analysis"},
-    "rerun": {"analysis"},
+    "matplotlib": {"report", "studies.paper"},
+    "rerun": {"trace"},
     "torch": {"learning"},
     "stable_baselines3": {"learning"},
     "gymnasium": {"learning"},
@@ -71,9 +76,15 @@ def modules() -> Iterator[tuple[str, Path]]:
 
 
 def room_of(module: str) -> str:
-    """`socialnav_mj.metrics.paper` is in room `metrics`; `tasks` and the package itself are their own rooms."""
+    """`socialnav_mj.metrics.paper` is in room `metrics`, `socialnav_mj.studies.paper.plan` in `studies.paper`.
+
+    `tasks` and the package itself are their own rooms.
+    """
     parts = module.split(".")
-    return parts[1] if parts[0] == "socialnav_mj" and len(parts) > 1 else parts[0]
+    if parts[0] != "socialnav_mj" or len(parts) == 1:
+        return parts[0]
+    inner = ".".join(parts[1:3])
+    return inner if inner in set().union(*ROWS) else parts[1]
 
 
 def imported_modules(tree: ast.AST, module: str, path: Path) -> Iterator[tuple[int, str]]:
@@ -137,6 +148,7 @@ def test_imports_only_point_upwards():
             if (module, other) in EXCEPTIONS:
                 continue
             closed = room == "controllers" and other not in CONTROLLERS_MAY_IMPORT
+            closed = closed or (room in STUDIES and other in STUDIES - {room})
             if closed or row.get(other, -1) > row.get(room, -1):
                 wrong.append(f"{path.relative_to(ROOT)}:{line} {room} imports {other}")
     assert not wrong, "\n".join(wrong)

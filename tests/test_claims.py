@@ -7,20 +7,20 @@ import pyarrow as pa
 import pytest
 from agents import METHOD_VALUES, experiment_table, roster_of, rows_of, table_of
 
-from socialnav_mj.analysis import two_way
-from socialnav_mj.analysis.claims import CLAIMS, examine, verdict_of, verdict_of_all
-from socialnav_mj.analysis.claims_page import claims_page
-from socialnav_mj.analysis.held_out import HELD_OUT, IN_SAMPLE, VALIDATION, period_of_people
-from socialnav_mj.analysis.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry, Term, make_panel
-from socialnav_mj.analysis.two_way import two_way_interval
 from socialnav_mj.recordings import Recording
+from socialnav_mj.studies import intervals
+from socialnav_mj.studies.held_out import HELD_OUT, IN_SAMPLE, VALIDATION, period_of_people
+from socialnav_mj.studies.intervals import two_way_interval
+from socialnav_mj.studies.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry, Term, make_panel
+from socialnav_mj.studies.paper.claims import CLAIMS, examine, verdict_of, verdict_of_all
+from socialnav_mj.studies.paper.claims_page import claims_page
 
 SEEDS = (0, 1, 2)
 
 
 @pytest.fixture(autouse=True)
 def few_resamples(monkeypatch):
-    monkeypatch.setattr(two_way, "N_RESAMPLES", 999)
+    monkeypatch.setattr(intervals, "N_RESAMPLES", 999)
 
 
 def verdicts(table, trainings=SEEDS):
@@ -108,7 +108,7 @@ def test_interval_of_one_column_is_students():
 @pytest.mark.parametrize(("by_draw", "by_training", "within"), [(1.0, 0.0, 0.3), (0.3, 1.0, 0.3), (1.0, 1.0, 1.0)])
 def test_intervals_cover_the_truth_as_often_as_they_say(monkeypatch, by_draw, by_training, within):
     """10 draws, 3 trainings, 300 studies: 95 % with a standard error of 1.3 %; too wide is allowed, too narrow not."""
-    monkeypatch.setattr(two_way, "N_RESAMPLES", 400)
+    monkeypatch.setattr(intervals, "N_RESAMPLES", 400)
     random = np.random.default_rng(5)
     covered = covered_given = 0
     for _ in range(300):

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import socialnav_mj.evaluation as evaluation_module
-from socialnav_mj.analysis.report import write_report
 from socialnav_mj.controllers import GoStraight
 from socialnav_mj.episode import Episode, EpisodeError, read_header
 from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, Pace, evaluate, jobs_of
+from socialnav_mj.report.writer import write_report
 
 TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
 TABLES = ("agents.parquet", "summary.csv")

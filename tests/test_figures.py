@@ -8,14 +8,16 @@ import pytest
 from agents import METHOD_VALUES, experiment_table, roster_of
 from toy_policies import write_toy
 
-from socialnav_mj.analysis import figures, style, two_way
-from socialnav_mj.analysis.figures import FIGURES, draw_figures, draw_sweep
-from socialnav_mj.analysis.levels import LEVEL_MEASURES, LevelTable, levels
-from socialnav_mj.analysis.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
-from socialnav_mj.analysis.reward_map import MOTIONS, REACH, draw_reward_maps, reward_map
-from socialnav_mj.analysis.style import LOOKS
-from socialnav_mj.analysis.training_curves import draw_training_curves, training_table
 from socialnav_mj.controllers.replay_irl import load_policy
+from socialnav_mj.report import style
+from socialnav_mj.studies import intervals
+from socialnav_mj.studies.levels import LEVEL_MEASURES, LevelTable, levels
+from socialnav_mj.studies.looks import LOOKS
+from socialnav_mj.studies.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
+from socialnav_mj.studies.paper import figures
+from socialnav_mj.studies.paper.figures import FIGURES, draw_figures, draw_sweep
+from socialnav_mj.studies.paper.reward_map import MOTIONS, REACH, draw_reward_maps, reward_map
+from socialnav_mj.studies.paper.training_curves import draw_training_curves, training_table
 
 SEEDS = (0, 1, 2)
 
@@ -32,7 +34,7 @@ def coarse(monkeypatch):
 @pytest.fixture(scope="module")
 def table():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(two_way, "N_RESAMPLES", 200)
+        patch.setattr(intervals, "N_RESAMPLES", 200)
         return level_table(noise=0.02)
 
 

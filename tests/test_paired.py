@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import t as student
 
-from socialnav_mj.analysis import report
-from socialnav_mj.analysis.contact_table import CONTACT_SCHEMA
-from socialnav_mj.analysis.draws import minimum_draws, resolutions
-from socialnav_mj.analysis.paired import DIFFERENCES, paired_differences
-from socialnav_mj.analysis.paired_figure import paired_figure
-from socialnav_mj.analysis.tables import read_results
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Outcome, Partner
+from socialnav_mj.report import writer
+from socialnav_mj.report.agents import read_results
+from socialnav_mj.report.collisions import CONTACT_SCHEMA
+from socialnav_mj.report.paired import DIFFERENCES, paired_differences
+from socialnav_mj.report.paired_figure import paired_figure
+from socialnav_mj.report.power import minimum_draws, resolutions
 
 HUMAN_STEPS = 20
 DRAWS = 4
@@ -72,9 +72,9 @@ def results(run):
 @pytest.fixture(scope="module")
 def written(run):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("socialnav_mj.analysis.trace.write_trace", lambda *_: None)
-        patch.setattr("socialnav_mj.analysis.statistics.N_RESAMPLES", 200)
-        return report.write_report(run).read_text()
+        patch.setattr("socialnav_mj.trace.writer.write_trace", lambda *_: None)
+        patch.setattr("socialnav_mj.report.estimates.N_RESAMPLES", 200)
+        return writer.write_report(run).read_text()
 
 
 def section(text, heading):

@@ -14,11 +14,11 @@ import pytest
 from episodes import Agent, Pedestrian, Touch, build_episode, line
 from rich.console import Console
 
-from socialnav_mj.analysis import report
-from socialnav_mj.analysis.statistics import MEASURES, estimate, summarise
-from socialnav_mj.analysis.tables import SCHEMA, agents_table, read_results
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode, EpisodeError, Outcome
+from socialnav_mj.report import writer
+from socialnav_mj.report.agents import SCHEMA, agents_table, read_results
+from socialnav_mj.report.estimates import MEASURES, estimate, summarise
 
 LABELS = {"dataset": "d", "variant": "v", "scenario": "s", "controller": "c", "measure": "m"}
 CONTROLLERS = ("zigzag", "human", "potential_field")
@@ -59,8 +59,8 @@ def run(template, tmp_path, monkeypatch):
         path.parent.mkdir(exist_ok=True)
         path.write_text(episode.metadata["state_hash"])
 
-    monkeypatch.setattr("socialnav_mj.analysis.trace.write_trace", note)
-    monkeypatch.setattr("socialnav_mj.analysis.statistics.N_RESAMPLES", 200)
+    monkeypatch.setattr("socialnav_mj.trace.writer.write_trace", note)
+    monkeypatch.setattr("socialnav_mj.report.estimates.N_RESAMPLES", 200)
     return shutil.copytree(template, tmp_path / "run")
 
 
@@ -156,7 +156,7 @@ def test_interval_covers_the_mean_of_normal_draws_about_as_often_as_it_says():
 
 
 def test_report_mentions_every_scenario_controller_and_hash(run):
-    text = report.write_report(run).read_text()
+    text = writer.write_report(run).read_text()
     for word in ("scenario_1", "scenario_4", "10 % of", "90 % of", "socialnav-mj evaluate", "mujoco 3.17.0", "0" * 64):
         assert word in text, word
     lines = text.splitlines()
@@ -168,7 +168,7 @@ def test_report_mentions_every_scenario_controller_and_hash(run):
 
 
 def test_report_writes_tables_that_agree_with_each_other(run):
-    report.write_report(run)
+    writer.write_report(run)
     assert pq.read_table(run / "agents.parquet").schema == SCHEMA
     summary = json.loads((run / "summary.json").read_text())
     rows = list(csv.DictReader((run / "summary.csv").open()))
@@ -184,7 +184,7 @@ def test_report_writes_tables_that_agree_with_each_other(run):
 
 
 def test_traces_show_the_first_draw_of_every_scenario_and_controller(run):
-    report.write_report(run)
+    writer.write_report(run)
     traces = {path.name for path in (run / "traces").iterdir()}
     assert traces == {f"{c}-{s}-0.rrd" for c in CONTROLLERS for s in (0.1, 0.9)}
     first = Episode.load(run / "episodes" / "potential_field-0.9-0.npz")
@@ -192,26 +192,26 @@ def test_traces_show_the_first_draw_of_every_scenario_and_controller(run):
 
 
 def test_equal_episodes_give_equal_bytes_whatever_the_number_of_processes(run):
-    report.write_report(run)
+    writer.write_report(run)
     before = outputs(run)
     assert set(before) == {"agents.parquet", "summary.csv", "summary.json", "report.md", "run.json"}
-    report.write_report(run, n_jobs=2)
+    writer.write_report(run, n_jobs=2)
     assert outputs(run) == before
 
 
 def test_damaged_episode_is_named_and_nothing_already_there_is_lost(run):
-    report.write_report(run)
+    writer.write_report(run)
     before = outputs(run)
     victim = run / "episodes" / "potential_field-0.1-2.npz"
     victim.write_bytes(victim.read_bytes()[:2000])
     for n_jobs in (1, 2):
         with pytest.raises(EpisodeError, match=r"potential_field-0\.1-2\.npz is not a readable episode"):
-            report.write_report(run, n_jobs=n_jobs)
+            writer.write_report(run, n_jobs=n_jobs)
     assert outputs(run) == before
 
 
 def test_interrupted_write_leaves_the_old_file_and_no_remains(run, monkeypatch):
-    report.write_report(run)
+    writer.write_report(run)
     before = outputs(run)
 
     def fail(*_):
@@ -219,20 +219,20 @@ def test_interrupted_write_leaves_the_old_file_and_no_remains(run, monkeypatch):
 
     monkeypatch.setattr("socialnav_mj.files.os.replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        report.write_report(run)
+        writer.write_report(run)
     assert outputs(run) == before
 
 
 def test_folder_without_episodes_is_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"no episodes in .*episodes; expected \*\.npz"):
-        report.write_report(tmp_path)
+        writer.write_report(tmp_path)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"command": 1, "controllers": []}', '{"command": "x"}'])
 def test_damaged_run_file_is_named(run, text):
     (run / "run.json").write_text(text)
     with pytest.raises(ValueError, match=r"run\.json"):
-        report.write_report(run)
+        writer.write_report(run)
 
 
 def test_only_named_episodes_are_read(run):
@@ -273,14 +273,14 @@ def test_episodes_of_different_controller_settings_are_not_compared(run):
 
 def test_uneven_draws_are_pointed_out(run):
     (run / "episodes" / "potential_field-0.1-3.npz").unlink()
-    text = report.write_report(run).read_text()
+    text = writer.write_report(run).read_text()
     assert "**Warning**: the rows of made_up / by_hand / scenario_1 have different draws" in text
 
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_terminal_tables_fit_and_name_every_row(run, width):
     console = Console(width=width, record=True, file=io.StringIO())
-    report.write_report(run, console=console)
+    writer.write_report(run, console=console)
     text = console.export_text()
     for word in (*CONTROLLERS, "scenario_1", "scenario_4", "0.25", "0.14", "4 draw(s)", "[s]", "[m/s]"):
         assert word in text, word

@@ -11,10 +11,10 @@ import pytest
 from episodes import Agent, Pedestrian, Touch, build_episode, line
 from rerun.chunk import RrdReader
 
-from socialnav_mj.analysis.lanes import assign_lanes, policy_changes, state_changes
-from socialnav_mj.analysis.touches import events
-from socialnav_mj.analysis.trace import chosen_agents, write_trace
 from socialnav_mj.episode import Episode, Outcome, Partner
+from socialnav_mj.trace.events import events
+from socialnav_mj.trace.lanes import assign_lanes, policy_changes, state_changes
+from socialnav_mj.trace.writer import chosen_agents, write_trace
 
 Rows = dict[int, Any]
 
@@ -326,7 +326,7 @@ def test_failed_write_leaves_the_old_file_alone(tmp_path: Path, monkeypatch: pyt
     def fail(episode: Episode) -> Any:
         raise RuntimeError("no story")
 
-    monkeypatch.setattr("socialnav_mj.analysis.trace.events", fail)
+    monkeypatch.setattr("socialnav_mj.trace.writer.events", fail)
     with pytest.raises(RuntimeError, match="no story"):
         write_trace(crowd(), path)
     assert [p.name for p in tmp_path.iterdir()] == ["trace.rrd"]

@@ -13,13 +13,13 @@ import pyarrow as pa
 import pyarrow.parquet
 import pytest
 
-from socialnav_mj.analysis.report import write_report
-from socialnav_mj.analysis.trace import write_trace
 from socialnav_mj.controllers import Limits, Observation, controller_of
 from socialnav_mj.episode import Episode, EpisodeError, Outcome
 from socialnav_mj.evaluation import Evaluation, evaluate
 from socialnav_mj.geometry import Array
+from socialnav_mj.report.writer import write_report
 from socialnav_mj.resources import assets_folder
+from socialnav_mj.trace.writer import write_trace
 from socialnav_mj.verification import Trust, files_of, resimulate, verify
 
 TINY = str(Path(__file__).parent / "data" / "tiny")

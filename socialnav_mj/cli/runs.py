@@ -57,9 +57,9 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, then report."""
-        from socialnav_mj.analysis.report import write_report
         from socialnav_mj.controllers import with_policy_of
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
+        from socialnav_mj.report.writer import write_report
 
         names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
         evaluation = Evaluation(
@@ -91,7 +91,7 @@ class Report:
 
     def run(self) -> None:
         """Report."""
-        from socialnav_mj.analysis.report import write_report
+        from socialnav_mj.report.writer import write_report
 
         path = write_report(self.folder, console=console, n_jobs=self.jobs)
         say(f"report: {path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
@@ -159,7 +159,7 @@ class Draws:
         """Print a table."""
         import pyarrow.parquet
 
-        from socialnav_mj.analysis.draws import resolutions
+        from socialnav_mj.report.power import resolutions
 
         agents = pyarrow.parquet.read_table(self.folder / "agents.parquet")
         table = Table(title=f"draws that resolve {self.difference:g} of {self.measure} at 95 %", title_justify="left")

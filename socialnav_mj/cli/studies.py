@@ -125,10 +125,10 @@ class Reproduce:
 
     def run(self) -> None:
         """Run, then draw and write."""
-        from socialnav_mj.reproduction.outputs import PUBLIC, write_outputs
-        from socialnav_mj.reproduction.plan import Experiment, shipped_for
-        from socialnav_mj.reproduction.record import publish
-        from socialnav_mj.reproduction.study import reproduce
+        from socialnav_mj.studies.files import publish
+        from socialnav_mj.studies.paper.outputs import PUBLIC, write_outputs
+        from socialnav_mj.studies.paper.plan import Experiment, shipped_for
+        from socialnav_mj.studies.study import reproduce
 
         experiment = Experiment(
             dataset=self.dataset,
@@ -180,9 +180,9 @@ class LeaveOneOut:
 
     def run(self) -> None:
         """Run, then write."""
-        from socialnav_mj.reproduction import leave_one_out
-        from socialnav_mj.reproduction.record import publish
-        from socialnav_mj.reproduction.study import reproduce
+        from socialnav_mj.studies.files import publish
+        from socialnav_mj.studies.leave_one_out import study as leave_one_out
+        from socialnav_mj.studies.study import reproduce
 
         study = leave_one_out.LeaveOneOut(
             recordings=self.recordings,

@@ -1,1 +1,0 @@
-"""What is made of episodes: statistics, tables, the report and the trace."""

@@ -1,0 +1,84 @@
+"""Figure of agents beside the people they replaced; readable in greyscale: controllers differ in mark and grey."""
+
+import io
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from socialnav_mj.report.estimates import Estimate
+
+PANELS = (
+    ("time", "time, censored [s]"),
+    ("path_of_arrivals", "path of arrivals [m]"),
+    ("intrusion_share", "share of steps within 1.2 m"),
+    ("minimum_distance", "minimum distance [m]"),
+)
+"""Key of `paired.DIFFERENCES` and the axis' label."""
+
+_MARKS = "osD^vPX<>*"
+_GREYS = ("0.0", "0.45", "0.7", "0.25", "0.6")
+_FORMATS = ("png", "svg")
+
+
+def paired_figure(differences: Sequence[Estimate]) -> dict[str, bytes]:
+    """Draw the paired differences, one panel a measure, scenarios along x, zero being the person itself.
+
+    Args:
+        differences: Of `paired.paired_differences`.
+
+    Returns:
+        File's content by format, "png" and "svg"; the same for the same numbers. Nothing if there is no number.
+    """
+    shown = [e for e in differences if not math.isnan(e.mean)]
+    if not shown:
+        return {}
+    # Not pyplot: it keeps figures and looks for a display.
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    places = list(dict.fromkeys((e.dataset, e.variant, e.scenario) for e in shown))
+    controllers = list(dict.fromkeys(e.controller for e in shown))
+    with rc_context({"svg.hashsalt": "socialnav-mj", "svg.fonttype": "none", "font.size": 9.0}):
+        figure = Figure(figsize=(10.0, 6.4), layout="constrained")
+        FigureCanvasAgg(figure)
+        for (measure, label), axes in zip(PANELS, figure.subplots(2, 2).flat, strict=True):
+            _draw(axes, [e for e in shown if e.measure == measure], places, controllers)
+            axes.set_ylabel(label)
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=min(5, len(labels)), frameon=False)
+        figure.supxlabel("agent minus the person it replaced; bars: 95 % interval over draws")
+        files = {}
+        for kind in _FORMATS:
+            stream = io.BytesIO()
+            metadata: dict[str, Any] = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
+            figure.savefig(stream, format=kind, dpi=150, metadata=metadata)
+            files[kind] = stream.getvalue()
+    return files
+
+
+def _draw(axes: Any, shown: Sequence[Estimate], places: Sequence[tuple[str, ...]], controllers: Sequence[str]) -> None:
+    several = len({place[:2] for place in places}) > 1
+    names = [" ".join(place[::2]) if several else place[2] for place in places]
+    axes.axhline(0.0, color="0.0", linewidth=0.8, linestyle=(0, (4, 3)), zorder=0)
+    for i, controller in enumerate(controllers):
+        own = [e for e in shown if e.controller == controller]
+        shift = 0.5 * (i - 0.5 * (len(controllers) - 1)) / max(1, len(controllers))
+        x = [places.index((e.dataset, e.variant, e.scenario)) + shift for e in own]
+        low = [0.0 if math.isnan(e.low) else e.mean - e.low for e in own]
+        high = [0.0 if math.isnan(e.high) else e.high - e.mean for e in own]
+        axes.errorbar(
+            x,
+            [e.mean for e in own],
+            yerr=[low, high],
+            fmt=_MARKS[i % len(_MARKS)],
+            color=_GREYS[i % len(_GREYS)],
+            markeredgecolor="0.0",
+            markersize=6.0,
+            capsize=3.0,
+            linewidth=1.0,
+            label=controller,
+        )
+    axes.set_xticks(range(len(places)), [name.replace("_", " ") for name in names])
+    axes.set_xlim(-0.5, len(places) - 0.5)
+    axes.spines[["top", "right"]].set_visible(False)

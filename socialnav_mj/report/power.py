@@ -1,0 +1,132 @@
+"""How many draws it takes to see a difference."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pyarrow as pa
+from scipy.stats import t as student
+
+from socialnav_mj.geometry import Array
+from socialnav_mj.report.estimates import CONFIDENCE, MEASURES, WEIGHTS, Columns, groups
+
+TARGETS = {"success": 0.05, "time_under_way": 1.0, "intrusion_share": 0.05, "minimum_distance": 0.05}
+"""Measures and the differences that the report asks for, in the measure's unit."""
+MOST_DRAWS = 100_000
+
+
+def minimum_draws(spread: float, difference: float, *, confidence: float = CONFIDENCE, power: float = 0.5) -> int:
+    """Smallest number of draws that resolves a difference.
+
+    The smallest n >= 2 with (t_a + t_b) spread / sqrt(n) <= difference, where t_a and t_b are Student's quantiles with
+    n - 1 degrees of freedom at (1 + confidence) / 2 and at `power`. With power 0.5 (t_b = 0) it is the n whose interval
+    reaches just `difference` to each side; a true difference of that size is then told from 0 in half of all studies.
+
+    Args:
+        spread: Standard deviation between draws of the draws' means, or of their paired differences, >= 0.
+        difference: To be resolved, > 0, in the same unit.
+        confidence: Of the interval, in (0, 1).
+        power: Probability of telling a true difference of this size from 0, in [0.5, 1).
+
+    Returns:
+        Number of draws.
+
+    Raises:
+        ValueError: If an argument is out of its range, or more than `MOST_DRAWS` were needed.
+    """
+    if not (spread >= 0.0 and np.isfinite(spread)):
+        raise ValueError(f"spread = {spread} is not allowed; allowed: finite numbers >= 0")
+    if not difference > 0.0:
+        raise ValueError(f"difference = {difference} is not allowed; allowed: numbers > 0")
+    if not (0.0 < confidence < 1.0 and 0.5 <= power < 1.0):
+        raise ValueError(f"confidence = {confidence}, power = {power}; allowed: in (0, 1) and in [0.5, 1)")
+
+    def reach(n: int) -> float:
+        quantiles = student.ppf(0.5 * (1.0 + confidence), n - 1) + student.ppf(power, n - 1)
+        return float(quantiles * spread / np.sqrt(n))
+
+    low, high = 1, 2  # reach(n) falls with n: double, then halve the bracket
+    while reach(high) > difference:
+        low, high = high, 2 * high
+        if high > MOST_DRAWS:
+            raise ValueError(f"a difference of {difference} at spread {spread} takes more than {MOST_DRAWS} draws")
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if reach(middle) <= difference else (middle, high)
+    return high
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resolution:
+    """What a run says about how many draws two controllers need to be told apart by one measure."""
+
+    dataset: str
+    variant: str
+    scenario: str
+    controllers: tuple[str, str]
+    measure: str
+    spread: float
+    """Standard deviation between draws of the paired difference."""
+    n_draws: int
+    """Draws that both have, at least 2."""
+    difference: float
+    """That is to be resolved."""
+    draws: int
+    """Whose 95 % interval reaches just that far."""
+    draws_for_power: int
+    """With which a true difference of that size is found in 80 % of studies."""
+
+
+def resolutions(agents: pa.Table, targets: dict[str, float] | None = None) -> list[Resolution]:
+    """How many draws each two controllers need, from the spread of their paired differences in this run.
+
+    Args:
+        agents: Columns of `agents.SCHEMA`.
+        targets: Measure of `estimates.MEASURES`: difference to be resolved; `TARGETS` if None.
+
+    Returns:
+        One for each scenario, two controllers that share at least 2 draws, and measure.
+
+    Raises:
+        ValueError: If a measure is unknown.
+    """
+    targets = TARGETS if targets is None else targets
+    if unknown := sorted(set(targets) - set(MEASURES)):
+        raise ValueError(f"unknown measure {unknown[0]!r}; available: {', '.join(MEASURES)}")
+    found = []
+    for (one, a, _), (two, b, _) in combinations(groups(agents), 2):
+        if [one[k] for k in _PLACE] != [two[k] for k in _PLACE]:
+            continue
+        for measure, difference in targets.items():
+            means, others = _draw_means(a, measure), _draw_means(b, measure)
+            shared = sorted(means.keys() & others.keys())
+            if len(shared) < 2:
+                continue
+            spread = float(np.std([means[d] - others[d] for d in shared], ddof=1))
+            found.append(
+                Resolution(
+                    **{k: one[k] for k in _PLACE},
+                    controllers=(one["controller"], two["controller"]),
+                    measure=measure,
+                    spread=spread,
+                    n_draws=len(shared),
+                    difference=difference,
+                    draws=minimum_draws(spread, difference),
+                    draws_for_power=minimum_draws(spread, difference, power=0.8),
+                )
+            )
+    return found
+
+
+_PLACE: Sequence[str] = ("dataset", "variant", "scenario")
+
+
+def _draw_means(columns: Columns, measure: str) -> dict[int, float]:
+    values = np.asarray(MEASURES[measure](columns), dtype=float)
+    weights: Array = columns[WEIGHTS[measure]].astype(float) if measure in WEIGHTS else np.ones_like(values)
+    defined = np.isfinite(values) & (weights > 0.0)
+    values, weights, draws = values[defined], weights[defined], columns["draw"][defined]
+    unit, index = np.unique(draws, return_inverse=True)
+    means = np.bincount(index, weights * values) / np.bincount(index, weights)
+    return dict(zip(unit.tolist(), means.tolist(), strict=True))

@@ -1,0 +1,140 @@
+"""What a study leaves behind: tables, where they come from, and a copy of what may travel with the project."""
+
+import csv
+import hashlib
+import io
+import json
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from socialnav_mj.controllers.replay_irl import load_policy
+from socialnav_mj.files import write_whole
+from socialnav_mj.report.agents import Results
+from socialnav_mj.studies.levels import Level
+from socialnav_mj.studies.study import Study
+
+
+def provenance_of(study: Study, results: Mapping[str, Results], *, command: str) -> dict[str, Any]:
+    """Where a study's figures come from.
+
+    Args:
+        study: That was run.
+        results: Of each run.
+        command: That made it.
+
+    Returns:
+        JSON values: command, experiment, policies with their cards, runs with the hash of their episodes' states.
+    """
+    trained = {policy: load_policy(policy) for policy in study.policies}
+    return {
+        "command": command,
+        "experiment": {k: v for k, v in asdict(study).items() if k != "data_dir"},
+        "policies": {
+            name: {"training_seed": policy.training_seed, "sha256": policy.checksum, "card": policy.card}
+            for name, policy in sorted(trained.items(), key=lambda item: item[1].training_seed)
+        },
+        "runs": {name: _run_facts(result) for name, result in results.items()},
+    }
+
+
+def _run_facts(results: Results) -> dict[str, Any]:
+    hashes = sorted(f"{source.file} {source.metadata['state_hash']}" for source in results.sources)
+    versions = {json.dumps(source.metadata.get("versions", {}), sort_keys=True) for source in results.sources}
+    return {
+        "episodes": len(hashes),
+        "agents": results.agents.num_rows,
+        "sha256_of_state_hashes": hashlib.sha256("\n".join(hashes).encode()).hexdigest(),
+        "versions": [json.loads(version) for version in sorted(versions)],
+    }
+
+
+def traceability(provenance: Mapping[str, Any], recordings: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Last section of a study's page: where everything comes from.
+
+    Args:
+        provenance: Experiment, policies and runs.
+        recordings: Name, variant and checksum of each.
+
+    Returns:
+        Lines.
+    """
+    lines = ["## Traceability", "", f"- experiment: `{json.dumps(provenance['experiment'], sort_keys=True)}`"]
+    lines += [f"- recording: {r['name']}, variant {r['variant']}, checksum {r['checksum']}" for r in recordings]
+    for policy, facts in provenance["policies"].items():
+        lines += [f"- policy {policy}: training seed {facts['training_seed']}, sha256 {facts['sha256']}"]
+    for name, run in provenance["runs"].items():
+        count = f"{run['episodes']} episodes, {run['agents']} agents"
+        lines += [f"- run {name}: {count}, sha256 of its state hashes {run['sha256_of_state_hashes']}"]
+    versions = {json.dumps(v, sort_keys=True) for run in provenance["runs"].values() for v in run["versions"]}
+    lines += [f"- versions: {', '.join(f'{k} {v}' for k, v in json.loads(text).items())}" for text in sorted(versions)]
+    return [*lines, "- everything, with the policies' cards: provenance.json"]
+
+
+def level_rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
+    """Levels as rows of a table.
+
+    Args:
+        found: The levels.
+        **labels: Columns that stand before them.
+
+    Returns:
+        Column: value, of each level.
+    """
+    return [
+        {
+            **labels,
+            "scenario": level.scenario,
+            "method": level.method,
+            "training": "all" if level.training is None else level.training,
+            "measure": level.measure,
+            **asdict(level.interval),
+            "n_values": level.n_values,
+        }
+        for level in found
+    ]
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write a table; numbers with six digits, NaN as nothing.
+
+    Args:
+        path: Target.
+        rows: All with the columns of the first.
+    """
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({k: _text(v) if isinstance(v, float) else v for k, v in row.items()})
+    write_whole(path, text.getvalue().encode())
+
+
+def _text(value: float) -> str:
+    return "" if value != value else f"{value:.6g}"
+
+
+def publish(out: Path, folder: Path, names: Iterable[str]) -> Path:
+    """Copy what may travel with the project.
+
+    Args:
+        out: Folder of a study.
+        folder: Where to; what is there of the same names is replaced.
+        names: Files and folders to copy.
+
+    Returns:
+        The folder.
+
+    Raises:
+        FileNotFoundError: If the study has no such outputs yet.
+    """
+    for name in names:
+        source, target = out / name, folder / name
+        if source.is_dir():
+            shutil.rmtree(target, ignore_errors=True)
+            shutil.copytree(source, target)
+        else:
+            write_whole(target, source.read_bytes())
+    return folder

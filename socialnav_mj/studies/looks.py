@@ -1,0 +1,65 @@
+"""How methods and scenarios look and are named in the figures and pages of all studies."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.studies.panel import MIXED, POTENTIAL_FIELD, REPLAY_IRL
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """How a method is drawn."""
+
+    label: str
+    colour: str
+    hatch: str
+    marker: str
+    line: Literal["-", "--", "-.", ":"]
+
+
+# P. Tol's "high-contrast" scheme: distinct for every kind of colour vision, and light, middle, dark in greyscale.
+LOOKS: dict[str, Look] = {
+    POTENTIAL_FIELD: Look(label="potential field", colour="#DDAA33", hatch="", marker="o", line="-"),
+    REPLAY_IRL: Look(label="ReplayIRL", colour="#004488", hatch="////", marker="s", line="--"),
+    MIXED: Look(label="mixed", colour="#BB5566", hatch="....", marker="D", line="-."),
+    HUMAN: Look(label="recorded humans", colour="#000000", hatch="", marker="^", line=":"),
+}
+SHADES = ("#000000", "#004488", "#BB5566", "#DDAA33")
+"""Dark to light, for whatever is no method; with MARKERS and LINES beside them."""
+MARKERS = ("o", "s", "D", "^")
+LINES = ("-", "--", "-.", ":")
+
+SCENARIO_TITLES = {
+    "scenario_1": "scenario 1: 10 % agents",
+    "scenario_2": "scenario 2: 30 % agents",
+    "scenario_3": "scenario 3: 70 % agents",
+    "scenario_4": "scenario 4: 90 % agents",
+}
+"""Task: its number, and the share of people whom agents replace."""
+
+
+def short_title(scenario: str, place: int) -> str:
+    """Title of a sub-figure.
+
+    Args:
+        scenario: Name of a task.
+        place: Of the sub-figure, from 0.
+
+    Returns:
+        As "(a) scenario 1: 10 %", the share being that of agents.
+    """
+    return f"({'abcdefgh'[place]}) {SCENARIO_TITLES.get(scenario, scenario).removesuffix(' agents')}"
+
+
+def methods_of(found: Sequence[str]) -> list[str]:
+    """Methods in the order of every legend.
+
+    Args:
+        found: Those that there are.
+
+    Returns:
+        The same, sorted.
+    """
+    return [method for method in LOOKS if method in found]

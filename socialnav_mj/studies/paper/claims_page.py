@@ -1,0 +1,90 @@
+"""claims.md: the verdict on every sentence of the paper, how it came about, and whether it survives the variants."""
+
+from collections.abc import Mapping, Sequence
+from math import isnan
+
+from socialnav_mj.report.markdown import head, row
+from socialnav_mj.studies.intervals import Interval
+from socialnav_mj.studies.paper.claims import COMPARABLE, Finding, Part, Verdict
+
+_RULE = f"""\
+- A claim is a list of comparisons, each a mean difference turned so that the claim says "greater than 0".
+- A comparison **holds** if its 95 % interval lies above 0, **fails** if it lies below 0, and is **undecided** if the \
+interval covers 0 or there is none.
+- A claim **holds** if all its comparisons hold, **fails** if at least one fails, and is **undecided** otherwise. A \
+claim about all four scenarios so needs all four. With every comparison at its own 95 %, a claim that holds is wrong \
+in at most 2.5 % of studies; a claim of eight comparisons that are all exactly 0 would fail by chance in up to 20 %.
+- Within a draw all controllers drove the same agents. A comparison is taken agent by agent, averaged over the draw's \
+agents, then over draws; learned policies are compared training by training, the potential field standing beside each.
+- Intervals are bootstraps clustered by draw and by training seed: draws and trainings are resampled, with deviations \
+stretched for their small number (`socialnav_mj.studies.intervals`). Three trainings say little about a fourth: the \
+interval **for the trainings at hand** resamples draws alone, and its verdict stands in brackets where it differs.
+- "Comparable" has no margin in the paper; here it is {COMPARABLE:.0%} of ReplayIRL's value to either side.
+- Time and path are compared over the agents that every controller brought home without a collision; over each one's \
+own successes a fragile controller would keep only the short trips. Claim f2 takes everybody, time-outs with the time \
+they were watched.
+"""
+
+
+def claims_page(findings: Mapping[str, Sequence[Finding]], *, titles: Mapping[str, str], command: str) -> str:
+    """The page.
+
+    Args:
+        findings: Variant: one finding for each claim; the first is the default setting.
+        titles: Variant: what it changes.
+        command: That made it.
+
+    Returns:
+        Markdown.
+    """
+    names = list(findings)
+    default = findings[names[0]]
+    lines = ["# The paper's claims", "", f"Command: `{command}`", "", "## Verdicts", ""]
+    lines += head(["claim", "the paper says", *(titles[name] for name in names)])
+    for place, finding in enumerate(default):
+        verdicts = [_verdict(findings[name][place]) for name in names]
+        lines.append(row([f"({finding.claim.key})", finding.claim.sentence, *verdicts]))
+    lines += ["", "## How a verdict comes about", "", _RULE]
+    for place, finding in enumerate(default):
+        lines += _section(finding, {name: findings[name][place] for name in names[1:]}, titles)
+    return "\n".join(lines) + "\n"
+
+
+def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[str, str]) -> list[str]:
+    claim = finding.claim
+    lines = [f"## ({claim.key}) {claim.sentence}", "", f"Test: {claim.test} [{claim.unit}].", ""]
+    lines += [f"Default setting: **{_verdict(finding)}**.", ""]
+    lines += head(["comparison", "effect", "95 % interval", "for the trainings at hand", "verdict", "draws"])
+    for part, interval, verdict in finding.parts:
+        given = _range(interval.low_given, interval.high_given)
+        count = f"{interval.n_draws}" + (f" x {interval.n_trainings} trainings" if interval.n_trainings else "")
+        cells = [part.label, f"{interval.mean:+.3f}", _range(interval.low, interval.high), given, verdict, count]
+        lines.append(row(cells))
+    lines += [row([label, "not run", "-", "-", "undecided", "0"]) for label in finding.missing] + [""]
+    if others:
+        lines += head(["variant", "verdict", "its weakest comparison", "effect", "95 % interval", "draws"])
+        for name, other in others.items():
+            if not other.parts:
+                lines.append(row([titles[name], other.verdict, "none was run", "-", "-", "0"]))
+                continue
+            part, interval, _ = min(other.parts, key=_strength)
+            effect = [f"{interval.mean:+.3f}", _range(interval.low, interval.high)]
+            lines.append(row([titles[name], _verdict(other), part.label, *effect, f"{interval.n_draws}"]))
+        lines.append("")
+    return lines
+
+
+def _strength(item: tuple[Part, Interval, Verdict]) -> tuple[int, float]:
+    """What fails comes first, then by the lower end."""
+    _, interval, verdict = item
+    return (0 if verdict == "fails" else 1, interval.mean if isnan(interval.low) else interval.low)
+
+
+def _verdict(finding: Finding) -> str:
+    if finding.verdict == finding.verdict_given:
+        return finding.verdict
+    return f"{finding.verdict} ({finding.verdict_given})"
+
+
+def _range(low: float, high: float) -> str:
+    return "-" if isnan(low) else f"{low:+.3f} to {high:+.3f}"

@@ -1,0 +1,162 @@
+"""What a learned reward thinks of one walker at each place around an agent."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Polygon
+
+from socialnav_mj.controllers.replay_irl import TrainedPolicy
+from socialnav_mj.features import View, running_state
+from socialnav_mj.geometry import Array
+from socialnav_mj.metrics import INTIMATE_DISTANCE
+from socialnav_mj.report.style import new_figure, save, style
+
+AGENT_SPEED, WALKER_SPEED, GOAL_DISTANCE = 0.8, 1.0, 5.0
+"""The agent drives ahead, its goal ahead [m/s], [m/s], [m]."""
+REACH, N_GRID = 3.0, 121
+"""Half the side of the map [m], and points along it."""
+
+
+def _approaching(ahead: Array) -> Array:
+    return -ahead
+
+
+def _crossing(ahead: Array) -> Array:
+    return np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
+
+
+def _receding(ahead: Array) -> Array:
+    return ahead
+
+
+MOTIONS: dict[str, Callable[[Array], Array]] = {
+    "approaching": _approaching,
+    "crossing": _crossing,
+    "receding": _receding,
+}
+"""Unit vector from the agent to the walker, (..., 2): direction in which it walks; crossing is counter-clockwise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardMap:
+    """Learned reward with one walker at each point of a square around the agent."""
+
+    x: Array
+    """(n,) ahead of the agent [m]."""
+    y: Array
+    """(n,) to its left [m]."""
+    reward: Array
+    """(n, n) by y and x, in (-1, 1)."""
+    alone: float
+    """Reward of the same state with nobody there."""
+
+
+def reward_map(policy: TrainedPolicy, motion: str) -> RewardMap:
+    """Evaluate the reward network on a grid of walkers.
+
+    Args:
+        policy: Trained.
+        motion: Of `MOTIONS`.
+
+    Returns:
+        The map.
+
+    Raises:
+        ValueError: If the motion is unknown.
+    """
+    if motion not in MOTIONS:
+        raise ValueError(f"unknown motion {motion!r}; available: {', '.join(MOTIONS)}")
+    axis = np.linspace(-REACH, REACH, N_GRID)
+    position = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 1, 2)
+    distance = np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
+    velocity = WALKER_SPEED * MOTIONS[motion](position / distance) - (AGENT_SPEED, 0.0)
+    reward = _reward(policy, position, velocity)
+    alone = _reward(policy, np.zeros((1, 0, 2)), np.zeros((1, 0, 2)))
+    return RewardMap(x=axis, y=axis, reward=reward.reshape(N_GRID, N_GRID), alone=float(alone[0]))
+
+
+def _reward(policy: TrainedPolicy, position: Array, velocity: Array) -> Array:
+    n = len(position)
+    view = View(
+        goal=np.tile([GOAL_DISTANCE, 0.0], (n, 1)),
+        twist=np.tile([AGENT_SPEED, 0.0], (n, 1)),
+        position=position,
+        velocity=velocity,
+        present=np.ones(position.shape[:2], dtype=bool),
+    )
+    return policy.reward_of(running_state(policy.features(view)))
+
+
+def draw_reward_maps(policies: Mapping[str, TrainedPolicy], folder: Path) -> list[Path]:
+    """Heat maps: a row for each policy, a column for each motion of the walker.
+
+    A white line runs where a walker changes nothing; the same value is marked "alone" on the scale.
+
+    Args:
+        policies: Title: policy.
+        folder: Gets a PNG and an SVG.
+
+    Returns:
+        Paths of the files.
+    """
+    maps = {title: [reward_map(policy, motion) for motion in MOTIONS] for title, policy in policies.items()}
+    with style():
+        figure = new_figure(0.55 + 1.95 * len(maps))
+        grid = figure.subplots(len(maps), len(MOTIONS), sharex=True, sharey=True, squeeze=False)
+        for axes, motion in zip(grid[0], MOTIONS, strict=True):
+            axes.set_title(f"walker {motion}")
+        for (title, row), axes_row in zip(maps.items(), grid, strict=True):
+            low = min(*(float(m.reward.min()) for m in row), row[0].alone)
+            high = max(*(float(m.reward.max()) for m in row), row[0].alone)
+            for motion, one, axes in zip(MOTIONS, row, axes_row, strict=True):
+                drawn = axes.pcolormesh(
+                    one.y, one.x, one.reward.T, cmap="cividis", vmin=low, vmax=high, rasterized=True, shading="nearest"
+                )
+                if low < one.alone < high:
+                    axes.contour(
+                        one.y,
+                        one.x,
+                        one.reward.T,
+                        levels=[one.alone],
+                        colors="white",
+                        linestyles="solid",
+                        linewidths=0.9,
+                    )
+                _furnish(axes, motion)
+            axes_row[0].set_ylabel(f"{title}\nahead [m]")
+            bar = figure.colorbar(drawn, ax=list(axes_row), label="learned reward", shrink=0.9)
+            bar.ax.axhline(row[0].alone, color="white", linewidth=2.0)
+            bar.ax.annotate(
+                "alone", (0.0, row[0].alone), (-2, 0), textcoords="offset points", ha="right", va="center", fontsize=6.5
+            )
+        for axes in grid[-1]:
+            axes.set_xlabel("to the left [m]")
+        return save(figure, folder, "figure_7_learned_reward")
+
+
+def _furnish(axes: Axes, motion: str) -> None:
+    """The agent, the 1.2 m around it, and the walker's direction here and there; left is left, ahead is up."""
+    axes.add_patch(Polygon([(0.0, 0.3), (0.17, -0.17), (-0.17, -0.17)], facecolor="white", edgecolor="black"))
+    axes.add_patch(Circle((0.0, 0.0), INTIMATE_DISTANCE, fill=False, edgecolor="black", linestyle="--", linewidth=0.8))
+    angle = np.arange(8) * np.pi / 4.0 + np.pi / 8.0
+    place = 2.25 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    heading = MOTIONS[motion](place / 2.25)
+    axes.quiver(
+        place[:, 1],
+        place[:, 0],
+        heading[:, 1],
+        heading[:, 0],
+        color="white",
+        edgecolor="black",
+        linewidth=0.4,
+        angles="xy",
+        scale=11.0,
+        width=0.014,
+    )
+    axes.set_xlim(REACH, -REACH)
+    axes.set_ylim(-REACH, REACH)
+    axes.set_aspect("equal")
+    axes.grid(False)

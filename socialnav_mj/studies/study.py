@@ -1,0 +1,129 @@
+"""What studies are made of: evaluations in folders of their own, run in turn."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import tasks
+from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
+from socialnav_mj.report.agents import Results, read_results
+from socialnav_mj.studies.panel import Entry
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """An evaluation of its own folder, and what its controllers are in the study."""
+
+    name: str
+    evaluation: Evaluation
+    roster: tuple[Entry, ...]
+    """One entry a controller, and the human row."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(ABC):
+    """Trained policies beside others, in several evaluations."""
+
+    policies: tuple[str, ...]
+    """Trained policies, as `load_policy` takes them."""
+    data_dir: str | None = None
+    """Where recordings are looked for first."""
+    scenarios: tuple[str, ...] = tasks.ALL_TASKS
+    draws: int = 10
+    seed: int = 0
+    """Of the first draw."""
+
+    @abstractmethod
+    def runs(self) -> list[Run]:
+        """Everything that has to be evaluated.
+
+        Returns:
+            Runs of different names.
+        """
+
+    def jobs(self) -> list[Job]:
+        """Every episode of every run."""
+        return [job for run in self.runs() for job in jobs_of(run.evaluation)]
+
+
+def learned(policy: str) -> str:
+    """A trained policy as a controller.
+
+    Args:
+        policy: As `load_policy` takes it.
+
+    Returns:
+        As `make_controller` takes it, and the tables name it.
+    """
+    return f"replay_irl(policy={policy!r})"
+
+
+def run_folder(out: Path, name: str) -> Path:
+    """Where the episodes of a run are.
+
+    Args:
+        out: Folder of the study.
+        name: Of the run.
+
+    Returns:
+        An evaluation's folder.
+    """
+    return out / "runs" / name
+
+
+def reproduce(study: Study, out: Path, *, command: str = "", n_jobs: int = -1) -> Iterator[Done]:
+    """Run what is not there yet; everything that can be wrong is told before anything runs.
+
+    Args:
+        study: What is to be run.
+        out: Gets `runs/NAME/episodes/*.npz`.
+        command: Kept beside the episodes.
+        n_jobs: Processes; -1 for one a core.
+
+    Returns:
+        A note of each episode. It raises `EvaluationError` after all others have run, if some could not be.
+
+    Raises:
+        FileNotFoundError: If a recording is not there.
+        EpisodeError: If an episode of the folder is damaged, or was run with another configuration.
+        ValueError: If the study asks for what does not exist or is not allowed.
+    """
+    started = [
+        evaluate(run.evaluation, run_folder(out, run.name), command=command, n_jobs=n_jobs) for run in study.runs()
+    ]
+    return _in_turn(started)
+
+
+def _in_turn(started: list[Iterator[Done]]) -> Iterator[Done]:
+    failures = []
+    for episodes in started:
+        try:
+            yield from episodes
+        except EvaluationError as error:
+            failures.append(str(error))
+    if failures:
+        raise EvaluationError("; ".join(failures))
+
+
+def read_runs(study: Study, out: Path, *, n_jobs: int = -1) -> dict[str, Results]:
+    """Read and score the episodes of a study, and none that its folder holds of more draws or other controllers.
+
+    Args:
+        study: That was run by `reproduce`.
+        out: Its folder.
+        n_jobs: Processes that score episodes.
+
+    Returns:
+        Name of the run: its results.
+
+    Raises:
+        FileNotFoundError: If a run lacks an episode.
+        EpisodeError: If an episode is damaged or does not fit the others.
+    """
+    return {
+        run.name: read_results(
+            run_folder(out, run.name), files=[job.file_name for job in jobs_of(run.evaluation)], n_jobs=n_jobs
+        )
+        for run in study.runs()
+    }

@@ -1,0 +1,1 @@
+"""Episode -> rerun recording, to be looked at; `writer` makes it."""

@@ -1,0 +1,195 @@
+"""The whole experiment on the smallest crowd: planned, run, resumed, written, published."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+from agents import experiment_table
+from toy_policies import write_toy
+
+from socialnav_mj.cli import main
+from socialnav_mj.controllers import make_controller
+from socialnav_mj.episode import EpisodeError
+from socialnav_mj.report import style
+from socialnav_mj.report.agents import Results
+from socialnav_mj.studies import intervals
+from socialnav_mj.studies.files import publish
+from socialnav_mj.studies.paper.claims import CLAIMS
+from socialnav_mj.studies.paper.outputs import PUBLIC, agents_of, write_outputs
+from socialnav_mj.studies.paper.plan import DEFAULT, SWEEP, VARIANTS, Experiment, shipped_for
+from socialnav_mj.studies.study import read_runs, reproduce, run_folder
+
+TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
+
+
+@pytest.fixture(scope="module")
+def policies(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("policies")
+    return tuple(write_toy(folder, f"p{seed}", seed=seed) for seed in (1, 0))
+
+
+@pytest.fixture
+def experiment(policies):
+    return Experiment(dataset=TINY, policies=policies, scenarios=("scenario_1", "scenario_4"), draws=2)
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(intervals, "N_RESAMPLES", 99)
+    monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
+
+
+def test_plan_runs_every_method_of_every_training_in_the_default_setting(experiment):
+    (run,) = experiment.runs()
+    methods = [(entry.method, entry.training_seed) for entry in run.roster]
+    learned = [(method, seed) for method in ("replay_irl", "mixed") for seed in (0, 1)]
+    assert methods == [("potential_field", None), *learned, ("human", None)]
+    assert len(experiment.jobs()) == 2 * 2 * 6
+
+
+def test_plan_names_controllers_as_the_tables_do(experiment):
+    for run in replace(experiment, variants=True).runs():
+        specs = [entry.controller for entry in run.roster if entry.method != "human"]
+        assert [make_controller(spec).name for spec in specs] == specs == list(run.evaluation.controllers)
+
+
+def test_variants_change_what_they_say_and_nothing_else(experiment):
+    runs = {run.name: run for run in replace(experiment, variants=True).runs()}
+    assert list(runs) == [variant.name for variant in VARIANTS] + ["switch_sweep"]
+    assert runs["radii_0.25"].evaluation.task_kwargs == {"pedestrian_radius": 0.08}
+    assert runs["radii_0.40"].evaluation.task_kwargs == {"pedestrian_radius": 0.23}
+    assert runs["turn_per_second"].evaluation.task_kwargs == {"turn_limit": "per_second"}
+    assert runs["retire"].evaluation.task_kwargs == {"on_collision": "retire"}
+    anyone = [make_controller(c) for c in runs["switch_anyone"].evaluation.controllers]
+    assert [(c.who, c.switch_distance) for c in anyone] == [("anyone", 2.0)] * 2
+    printed = [make_controller(c) for c in runs["pf_as_printed"].evaluation.controllers]
+    assert printed[0].attraction_limit is None
+    assert [make_controller(c.far).attraction_limit for c in printed[1:]] == [None, None]
+    swept = [make_controller(c).switch_distance for c in runs["switch_sweep"].evaluation.controllers]
+    assert swept == [d for d in SWEEP for _ in range(2)] and 2.0 not in SWEEP
+
+
+def test_variants_may_have_fewer_draws_than_the_default_setting(experiment):
+    wide = replace(experiment, variants=True, draws=3, variant_draws=2, seed=5)
+    assert [run.evaluation.draws for run in wide.runs()] == [3] + [2] * len(VARIANTS)
+    table = experiment_table(n_draws=9, n_agents=2, trainings=(0, 1))
+    spec = next(e.controller for e in wide.roster(DEFAULT) if e.method == "potential_field")
+    table = table.set_column(
+        table.schema.get_field_index("controller"), "controller", pa.array([spec] * table.num_rows)
+    )
+    variant = next(v for v in VARIANTS if v.name == "switch_anyone")
+    empty = Results(agents=table.slice(0, 0), contacts=pa.table({}), overlaps={}, sources=())
+    results = {"default": replace(empty, agents=table), variant.name: empty}
+    assert max(agents_of(wide, variant, results)["draw"].to_pylist()) == 6
+    with pytest.raises(ValueError, match="variant_draws = 4 is not allowed; allowed: 1 to draws = 3"):
+        replace(wide, variant_draws=4)
+
+
+def test_variant_takes_unchanged_methods_from_the_default_setting(experiment):
+    variant = next(v for v in VARIANTS if v.name == "switch_anyone")
+    table = experiment_table(n_draws=1, n_agents=2, trainings=(0, 1))
+    roster = {e.method + str(e.training_seed): e.controller for e in experiment.roster(DEFAULT)}
+    known = {
+        "irl0": "replay_irl0",
+        "irl1": "replay_irl1",
+        "mix0": "mixed0",
+        "mix1": "mixed1",
+        "pf": "potential_fieldNone",
+        "human": "humanNone",
+    }
+    controllers = pa.array([roster[known[name]] for name in table["controller"].to_pylist()])
+    table = table.set_column(table.schema.get_field_index("controller"), "controller", controllers)
+    results = {
+        name: Results(agents=table, contacts=pa.table({}), overlaps={}, sources=())
+        for name in ("default", variant.name)
+    }
+    results[variant.name] = replace(results[variant.name], agents=table.slice(0, 0))
+    taken = set(agents_of(experiment, variant, results)["controller"].to_pylist())
+    assert taken == {roster["potential_fieldNone"], roster["replay_irl0"], roster["replay_irl1"]}
+    assert agents_of(experiment, DEFAULT, results).num_rows == table.num_rows
+
+
+def test_experiment_refuses_no_policy_two_of_a_seed_and_unknown_recordings(policies):
+    with pytest.raises(ValueError, match="one or more trained policies"):
+        Experiment(dataset=TINY, policies=())
+    with pytest.raises(ValueError, match=r"training seeds \[1, 1\]; allowed: one of each"):
+        Experiment(dataset=TINY, policies=(policies[0], policies[0]))
+    with pytest.raises(ValueError, match="no shipped policy was trained on 'nowhere' with 'continuous' features"):
+        shipped_for("nowhere")
+
+
+def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsys):
+    out, public = tmp_path / "out", tmp_path / "results"
+    command = ["reproduce", "--dataset", TINY, "--policies", *policies, "--scenarios", "1", "4", "--draws", "1"]
+    command += ["--jobs", "1", "--out", str(out), "--publish", str(public)]
+    main(command)
+    assert "claims:" in capsys.readouterr().out.replace("\n", " ")
+    episodes = sorted((out / "runs" / "default" / "episodes").glob("*.npz"))
+    assert len(episodes) == 2 * 6
+    before = {path: path.stat().st_mtime_ns for path in episodes}
+    tables = {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
+    episodes[3].unlink()
+    main(command)
+    after = {path: path.stat().st_mtime_ns for path in episodes}
+    assert [path for path in episodes if after[path] != before[path]] == [episodes[3]]
+    assert {path.name: path.read_bytes() for path in (out / "tables").iterdir()} == tables
+
+    assert sorted(path.name for path in public.iterdir()) == sorted(
+        ["README.md", "claims.md", "figures", "provenance.json", "tables"]
+    )
+    assert not list(public.rglob("*.npz")) and not list(public.rglob("*.parquet"))
+    assert {p.name for p in public.glob("tables/*")} == {
+        "levels.csv",
+        "claims.csv",
+        "held_out.csv",
+        "switch_distance.csv",
+    }
+    page = (public / "README.md").read_text()
+    linked = [part.split(")")[0] for part in page.split("](")[1:]]
+    assert len(linked) >= 7 and all((public / name).is_file() for name in linked)
+
+
+def test_variants_and_sweep_are_run_and_judged(experiment, tmp_path):
+    experiment = replace(experiment, variants=True, scenarios=("scenario_4",), draws=1)
+    done = list(reproduce(experiment, tmp_path, command="made so", n_jobs=1))
+    assert len(done) == len(experiment.jobs()) and all(d.error is None for d in done)
+    page = write_outputs(experiment, tmp_path, command="made so", n_jobs=1)
+    claims = list(csv.DictReader((tmp_path / "tables" / "claims.csv").open()))
+    assert {row["variant"] for row in claims} == {variant.name for variant in VARIANTS}
+    swept = list(csv.DictReader((tmp_path / "tables" / "switch_distance.csv").open()))
+    assert {float(row["switch_distance"]) for row in swept} == {*SWEEP, 2.0}
+    assert {row["method"] for row in swept} == {"mixed"}
+    assert (tmp_path / "figures" / "figure_6_switch_distance.svg").is_file()
+    assert "## Switch distance" in page.read_text()
+    assert "turn limit per second" in (tmp_path / "figures" / "figure_8_variants.svg").read_text()
+    text = (tmp_path / "claims.md").read_text()
+    assert all(variant.title in text for variant in VARIANTS) and all(f"## ({c.key}) " in text for c in CLAIMS)
+    provenance = json.loads((tmp_path / "provenance.json").read_text())
+    assert provenance["command"] == "made so"
+    assert all(len(facts["sha256"]) == 64 for facts in provenance["policies"].values())
+    assert all(run["versions"][0]["mujoco"] for run in provenance["runs"].values())
+
+
+def test_fewer_draws_than_the_folder_holds_are_read_alone(experiment, tmp_path):
+    experiment = replace(experiment, scenarios=("scenario_4",))
+    list(reproduce(experiment, tmp_path, n_jobs=1))
+    for draws in (2, 1):
+        results = read_runs(replace(experiment, draws=draws), tmp_path, n_jobs=1)["default"]
+        assert len(results.sources) == 6 * draws and {s.draw for s in results.sources} == {*range(draws)}
+
+
+def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(experiment, tmp_path):
+    experiment = replace(experiment, scenarios=("scenario_1",), draws=1)
+    list(reproduce(experiment, tmp_path, n_jobs=1))
+    (run_folder(tmp_path, "default")).rename(tmp_path / "runs" / "radii_0.25")
+    with pytest.raises(EpisodeError, match=r"pedestrian_radius = 0.15, but 0.08 is asked for"):
+        reproduce(replace(experiment, variants=True), tmp_path, n_jobs=1)
+    assert not run_folder(tmp_path, "default").joinpath("episodes").exists()
+
+
+def test_publishing_needs_outputs(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        publish(tmp_path / "nothing", tmp_path / "results", PUBLIC)
