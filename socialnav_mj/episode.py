@@ -285,6 +285,26 @@ class Episode:
             return episode
 
 
+MAX_NAME = 200
+"""Longest name of a controller, scenario or recording [characters]."""
+
+
+def check_name(key: str, name: Any) -> None:
+    """Refuse what could not stand as a name in a table.
+
+    Args:
+        key: What is named.
+        name: Its name.
+
+    Raises:
+        EpisodeError: If it is no text, too long, or holds a line break or another character that cannot be printed.
+    """
+    if not isinstance(name, str) or len(name) > MAX_NAME or not name.isprintable():
+        raise EpisodeError(
+            f"{key} is {str(name)[:MAX_NAME]!r}; allowed: up to {MAX_NAME} printable characters in one line"
+        )
+
+
 def read_header(path: str | Path) -> dict[str, Any]:
     """The small part of an episode file, without its arrays.
 

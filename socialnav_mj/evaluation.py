@@ -13,7 +13,7 @@ import tasks
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_config, make_controller
 from socialnav_mj.environment import make_scenario
-from socialnav_mj.episode import EpisodeError, read_header
+from socialnav_mj.episode import EpisodeError, check_name, read_header
 from socialnav_mj.files import write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
@@ -241,6 +241,7 @@ def _controller_configurations(specs: tuple[str, ...]) -> dict[str, dict[str, An
     configurations: dict[str, dict[str, Any]] = {}
     for spec in specs:
         controller = make_controller(spec)
+        check_name(f"the name of controller {spec!r}", controller.name)
         if controller.name in (*configurations, HUMAN):
             raise ValueError(
                 f"controller {spec!r} is named {controller.name!r} like another row of the tables; give it another name"

@@ -12,12 +12,13 @@ from scipy.stats import t as student
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Outcome, Partner
-from socialnav_mj.report import writer
+from socialnav_mj.report import power, writer
 from socialnav_mj.report.agents import read_results
 from socialnav_mj.report.collisions import CONTACT_SCHEMA
 from socialnav_mj.report.paired import DIFFERENCES, paired_differences
 from socialnav_mj.report.paired_figure import paired_figure
-from socialnav_mj.report.power import minimum_draws, resolutions
+from socialnav_mj.report.power import minimum_draws, resolutions, told
+from socialnav_mj.report.sections import draws_section
 
 HUMAN_STEPS = 20
 DRAWS = 4
@@ -203,12 +204,22 @@ def test_minimum_draws_tells_a_difference_as_often_as_it_says():
         ((-1.0, 0.1), "spread = -1"),
         ((math.nan, 0.1), "spread = nan"),
         ((1.0, 0.0), "difference = 0"),
-        ((1.0, 1e-6), "more than 100000 draws"),
     ],
 )
 def test_minimum_draws_refuses_what_has_no_answer(arguments, message):
     with pytest.raises(ValueError, match=message):
         minimum_draws(*arguments)
+
+
+def test_more_draws_than_anybody_runs_are_told_as_such():
+    assert minimum_draws(1.0, 1e-6) is None
+    assert told(None) == "> 100,000" and told(12) == "12"
+
+
+def test_report_goes_on_where_a_spread_takes_too_many_draws(results, monkeypatch):
+    monkeypatch.setattr(power, "MOST_DRAWS", 2)
+    lines = draws_section(resolutions(results.agents))
+    assert any("> 2 / > 2 (" in line for line in lines)
 
 
 def test_resolutions_use_the_spread_of_paired_differences(results, written):

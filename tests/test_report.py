@@ -7,11 +7,13 @@ import math
 import shutil
 from dataclasses import replace
 
+import lxml.html
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from episodes import Agent, Pedestrian, Touch, build_episode, line
+from markdown_it import MarkdownIt
 from rich.console import Console
 
 from socialnav_mj.config import Scenario
@@ -291,3 +293,25 @@ def test_terminal_tables_fit_and_name_every_row(run, width):
 def test_table_of_an_empty_episode_has_no_rows():
     table = agents_table(build_episode([], [Pedestrian(positions=[(0, 0)])]))
     assert table.num_rows == 0 and table.schema == SCHEMA and summarise(pa.concat_tables([table])) == []
+
+
+HOSTILE_NAMES = ("<script>alert(1)</script>", "[a](javascript:alert(1))", "`` ` <b>", "a|b")
+
+
+@pytest.mark.parametrize("name", HOSTILE_NAMES)
+def test_names_from_files_stay_text_in_the_report(name, tmp_path):
+    make(name).save(tmp_path / "episodes" / "a.npz")
+    run = {"command": f"evaluate {name}", "controllers": [], "episodes": ["a.npz"]}
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    text = writer.write_report(tmp_path).read_text()
+    shown = lxml.html.fromstring(MarkdownIt("commonmark").enable("table").render(text))
+    assert not shown.xpath("//script | //b | //a")
+    cells = [cell.text_content() for cell in shown.xpath("//td[1]")]
+    assert any(name.replace("`", "") in cell.replace("`", "") for cell in cells)
+
+
+@pytest.mark.parametrize("name", ["# a\n# b", "x" * 201, "a\x1b[31m", "a\u2028b"])
+def test_names_that_are_no_names_are_refused(name, tmp_path):
+    make(name).save(tmp_path / "episodes" / "a.npz")
+    with pytest.raises(EpisodeError, match=r"a\.npz.*controller.*printable"):
+        writer.write_report(tmp_path)

@@ -159,13 +159,13 @@ class Draws:
         """Print a table."""
         import pyarrow.parquet
 
-        from socialnav_mj.report.power import resolutions
+        from socialnav_mj.report.power import resolutions, told
 
         agents = pyarrow.parquet.read_table(self.folder / "agents.parquet")
         table = Table(title=f"draws that resolve {self.difference:g} of {self.measure} at 95 %", title_justify="left")
         for heading in ("scenario", "controllers", "draws here", "spread", "for the interval", "for 80 % power"):
             table.add_column(heading)
         for r in resolutions(agents, {self.measure: self.difference}):
-            needed = (str(r.n_draws), f"{r.spread:.4f}", str(r.draws), str(r.draws_for_power))
+            needed = (str(r.n_draws), f"{r.spread:.4f}", told(r.draws), told(r.draws_for_power))
             table.add_row(r.scenario, " - ".join(r.controllers), *needed)
         console.print(table)

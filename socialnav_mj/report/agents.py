@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 import tasks
-from socialnav_mj.episode import Episode, EpisodeError, Partner
+from socialnav_mj.episode import Episode, EpisodeError, Partner, check_name
 from socialnav_mj.metrics import ZONES, Fault, Severity, per_agent
 from socialnav_mj.metrics.contacts import pedestrian_overlaps
 from socialnav_mj.processes import in_processes
@@ -230,13 +230,13 @@ def _read(path: Path) -> tuple[Source, pa.Table, pa.Table, float]:
 
 
 def check_names(metadata: dict[str, Any]) -> None:
-    """Draw and scenario by which an episode is filed are those that it was run with.
+    """Draw and scenario by which an episode is filed are those that it was run with, and its names are names.
 
     Args:
         metadata: Of an episode.
 
     Raises:
-        EpisodeError: If something is missing or contradicts the scenario's configuration.
+        EpisodeError: If something is missing, contradicts the scenario's configuration, or is no name.
     """
     missing = [key for key in _METADATA if key not in metadata]
     for key, parts in _PARTS.items():
@@ -244,7 +244,11 @@ def check_names(metadata: dict[str, Any]) -> None:
         missing += [f"{key}.{part}" for part in parts if not isinstance(given, dict) or part not in given]
     if missing:
         raise EpisodeError(f"its metadata lack {', '.join(missing)}; there are {', '.join(sorted(metadata))}")
-    scenario = metadata["scenario"]
+    recording, scenario = metadata["recording"], metadata["scenario"]
+    for key in ("controller", "scenario_name"):
+        check_name(key, metadata[key])
+    for key in _PARTS["recording"]:
+        check_name(f"recording.{key}", recording[key])
     if metadata["draw"] != scenario["seed"]:
         raise EpisodeError(f"it calls itself draw {metadata['draw']!r}, but its scenario has seed {scenario['seed']!r}")
     share = tasks.SHARES.get(metadata["scenario_name"], scenario["share"])

@@ -16,7 +16,9 @@ TARGETS = {"success": 0.05, "time_under_way": 1.0, "intrusion_share": 0.05, "min
 MOST_DRAWS = 100_000
 
 
-def minimum_draws(spread: float, difference: float, *, confidence: float = CONFIDENCE, power: float = 0.5) -> int:
+def minimum_draws(
+    spread: float, difference: float, *, confidence: float = CONFIDENCE, power: float = 0.5
+) -> int | None:
     """Smallest number of draws that resolves a difference.
 
     The smallest n >= 2 with (t_a + t_b) spread / sqrt(n) <= difference, where t_a and t_b are Student's quantiles with
@@ -30,10 +32,10 @@ def minimum_draws(spread: float, difference: float, *, confidence: float = CONFI
         power: Probability of telling a true difference of this size from 0, in [0.5, 1).
 
     Returns:
-        Number of draws.
+        Number of draws; None if more than `MOST_DRAWS` were needed.
 
     Raises:
-        ValueError: If an argument is out of its range, or more than `MOST_DRAWS` were needed.
+        ValueError: If an argument is out of its range.
     """
     if not (spread >= 0.0 and np.isfinite(spread)):
         raise ValueError(f"spread = {spread} is not allowed; allowed: finite numbers >= 0")
@@ -50,7 +52,7 @@ def minimum_draws(spread: float, difference: float, *, confidence: float = CONFI
     while reach(high) > difference:
         low, high = high, 2 * high
         if high > MOST_DRAWS:
-            raise ValueError(f"a difference of {difference} at spread {spread} takes more than {MOST_DRAWS} draws")
+            return None
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if reach(middle) <= difference else (middle, high)
@@ -72,10 +74,22 @@ class Resolution:
     """Draws that both have, at least 2."""
     difference: float
     """That is to be resolved."""
-    draws: int
-    """Whose 95 % interval reaches just that far."""
-    draws_for_power: int
-    """With which a true difference of that size is found in 80 % of studies."""
+    draws: int | None
+    """Whose 95 % interval reaches just that far; None if more than `MOST_DRAWS`."""
+    draws_for_power: int | None
+    """With which a true difference of that size is found in 80 % of studies; None likewise."""
+
+
+def told(draws: int | None) -> str:
+    """A number of draws as text.
+
+    Args:
+        draws: Of `minimum_draws`.
+
+    Returns:
+        Such as "12", or "> 100,000".
+    """
+    return f"> {MOST_DRAWS:,}" if draws is None else str(draws)
 
 
 def resolutions(agents: pa.Table, targets: dict[str, float] | None = None) -> list[Resolution]:

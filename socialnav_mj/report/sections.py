@@ -12,7 +12,7 @@ from socialnav_mj.metrics.severity import Severity
 from socialnav_mj.report.estimates import Columns, Estimate, groups
 from socialnav_mj.report.markdown import table
 from socialnav_mj.report.paired import DIFFERENCES
-from socialnav_mj.report.power import Resolution
+from socialnav_mj.report.power import Resolution, told
 
 Rows = list[list[str]]
 
@@ -147,7 +147,7 @@ def draws_section(found: Iterable[Resolution]) -> list[str]:
     for key, group in groupby(found, key=lambda r: (r.dataset, r.variant, r.scenario, r.controllers)):
         row = {r.measure: r for r in group}
         columns |= {name: f"{name} to {r.difference:g}" for name, r in row.items()}
-        cells = [f"{r.draws} / {r.draws_for_power} ({r.spread:.3f})" for r in row.values()]
+        cells = [f"{told(r.draws)} / {told(r.draws_for_power)} ({r.spread:.3f})" for r in row.values()]
         rows.append([_place_of(*key[:3]), " - ".join(key[3]), *cells, str(min(r.n_draws for r in row.values()))])
     headings = ["scenario", "controllers", *columns.values(), "from draws"]
     return ["## How many draws it takes", "", _DRAWS, *table(headings, rows)] if rows else []

@@ -21,7 +21,7 @@ from socialnav_mj.episode import Episode
 from socialnav_mj.files import write_whole
 from socialnav_mj.report.agents import Results, Source, read_results, scenario_configuration
 from socialnav_mj.report.estimates import Estimate, summarise
-from socialnav_mj.report.markdown import head, row
+from socialnav_mj.report.markdown import code, head, plain, row
 from socialnav_mj.report.paired import paired_differences
 from socialnav_mj.report.paired_figure import paired_figure
 from socialnav_mj.report.power import resolutions
@@ -273,9 +273,9 @@ def _warnings(sources: Sequence[Source]) -> list[str]:
 
 def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: Sequence[str]) -> str:
     lines = ["# Report", ""]
-    lines += [f"Command: `{summary['command']}`" if summary["command"] else "Command: not recorded (no run.json)."]
+    lines += [f"Command: {code(summary['command'])}" if summary["command"] else "Command: not recorded (no run.json)."]
     lines += ["", "Made from the episode files alone; `socialnav-mj report FOLDER` makes it again.", ""]
-    lines += [f"**Warning**: {warning}.\n" for warning in summary["warnings"]]
+    lines += [f"**Warning**: {plain(warning)}.\n" for warning in summary["warnings"]]
     headings = ["controller", "success", "95 % interval", *(heading for heading, _, _ in _COLUMNS[1:])]
     for (dataset, variant, scenario), rows in _by_scenario(estimates):
         share = next(
@@ -283,7 +283,7 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: 
             for g in summary["groups"]
             if (g["dataset"], g["variant"], g["scenario"]) == (dataset, variant, scenario)
         )
-        lines += [f"## {dataset} ({variant}), {scenario}: {100 * share:g} % of the people replaced", ""]
+        lines += [f"## {plain(f'{dataset} ({variant}), {scenario}')}: {100 * share:g} % of the people replaced", ""]
         lines += head([*headings, "draws", "agents"])
         for controller, own in rows:
             cells = [_cell(own[measure], digits) for _, measure, digits in _COLUMNS]
@@ -292,16 +292,20 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: 
         lines.append("")
     lines += sections
     lines += ["## How to read it", "", _HOW_TO_READ, "## Traceability", "", "Recordings:", ""]
-    lines += [f"- {r['name']}, variant {r['variant']}, checksum {r['checksum']}" for r in summary["recordings"]]
+    recordings = (f"{r['name']}, variant {r['variant']}, checksum {r['checksum']}" for r in summary["recordings"])
+    lines += [f"- {plain(text)}" for text in recordings]
     lines += ["", "Versions:", ""]
-    lines += ["- " + ", ".join(f"{name} {version}" for name, version in v.items()) for v in summary["versions"]]
+    versions = (", ".join(f"{name} {version}" for name, version in v.items()) for v in summary["versions"])
+    lines += [f"- {plain(text)}" for text in versions]
     lines += ["", "Configurations (the draw's seed apart):", ""]
     configurations: dict[str, Any] = {}
     for group in summary["groups"]:
         dataset = f"{group['dataset']} ({group['variant']})"
         configurations[f"{group['scenario']} of {dataset}"] = group["scenario_configuration"]
         configurations[f"{group['controller']} on {dataset}"] = group["controller_configuration"]
-    lines += [f"- {name}: `{json.dumps(value, sort_keys=True)}`" for name, value in sorted(configurations.items())]
+    lines += [
+        f"- {plain(name)}: {code(json.dumps(value, sort_keys=True))}" for name, value in sorted(configurations.items())
+    ]
     lines += ["", "Episodes:", "", *head(["file", "draw", "state hash"])]
     lines += [
         row([e["file"], str(e["draw"]), e["state_hash"]]) for group in summary["groups"] for e in group["episodes"]
