@@ -77,6 +77,18 @@ def test_second_touch_of_a_pair_is_repeated_and_the_first_of_another_is_not():
     assert metrics.repeated_collisions(episode).tolist() == [2, 0]
 
 
+def test_partners_are_told_by_the_person_that_they_are_or_replace():
+    people = [Pedestrian(positions=np.tile((2, 0), (6, 1))), Pedestrian(positions=np.tile((3, 0), (6, 1)))]
+    agents = [Agent(positions=line((0, 0), (4, 0), 5)), Agent(positions=line((0, 5), (4, 5), 5))]
+    touches = [Touch(agent=0, partner=1, step=1), Touch(agent=0, partner=1, step=2, kind=Partner.AGENT)]
+    episode = build_episode(agents, people, touches)
+    # In order of time: agent 0 with person 1, then both sides of the touch between the agents.
+    expected = [episode.pedestrian_person[1], episode.agent_person[1], episode.agent_person[0]]
+    assert contacts.partner_person(episode, np.arange(3)).tolist() == expected
+    assert contacts.partner_person(episode, np.array([2, 0])).tolist() == [expected[2], expected[0]]
+    assert len(set(expected)) == 3
+
+
 def test_agent_that_drives_is_not_struck_standing_and_neither_is_one_that_nobody_walked_into():
     assert metrics.struck_standing(meeting(0.05, -1.0)).tolist() == [True]
     assert metrics.struck_standing(meeting(-0.5, -1.0)).tolist() == [False]

@@ -5,7 +5,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.episode import Episode, IntArray
+from socialnav_mj.episode import Episode, IntArray, Partner
 from socialnav_mj.geometry import Array, wrap_angle
 from socialnav_mj.metrics.kinematics import STANDING_SPEED
 from socialnav_mj.metrics.pairs import pairs, radii
@@ -71,6 +71,23 @@ def bearing(episode: Episode) -> Array:
     """
     normal = episode.contact_normal
     return wrap_angle(np.arctan2(normal[:, 1], normal[:, 0]) - episode.contact_agent_heading)
+
+
+def partner_person(episode: Episode, rows: IntArray) -> IntArray:
+    """Ids of the people the partners are, or replace.
+
+    Args:
+        episode: The record.
+        rows: (k,) contact rows.
+
+    Returns:
+        Shape (k,).
+    """
+    result = np.zeros(len(rows), dtype=np.int64)
+    for kind, ids in ((Partner.PEDESTRIAN, episode.pedestrian_person), (Partner.AGENT, episode.agent_person)):
+        here = episode.contact_partner_kind[rows] == kind
+        result[here] = ids[episode.contact_partner[rows][here]]
+    return result
 
 
 def first_touch(episode: Episode) -> BoolArray:

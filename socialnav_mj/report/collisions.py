@@ -13,10 +13,10 @@ from socialnav_mj.metrics.contacts import (
     bearing,
     fault,
     first_touch,
+    partner_person,
     standing,
 )
 from socialnav_mj.metrics.severity import Severity, flesh_force, severity
-from socialnav_mj.trace.events import partner_person
 
 CONTACT_SCHEMA = pa.schema(
     [

@@ -1,14 +1,12 @@
 """Touches and other events of an episode, told in words."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from socialnav_mj.episode import Episode, Outcome, Partner
-
-Index = NDArray[np.int64]
+from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
+from socialnav_mj.metrics.contacts import partner_person
 
 
-def touch_rows(episode: Episode) -> Index:
+def touch_rows(episode: Episode) -> IntArray:
     """Contact rows with each touch once: a touch between two agents stands in two rows of an Episode.
 
     Args:
@@ -21,24 +19,7 @@ def touch_rows(episode: Episode) -> Index:
     return np.flatnonzero(once)
 
 
-def partner_person(episode: Episode, rows: Index) -> Index:
-    """Ids of the people the partners are, or replace.
-
-    Args:
-        episode: The record.
-        rows: (k,) contact rows.
-
-    Returns:
-        Shape (k,).
-    """
-    result = np.zeros(len(rows), dtype=np.int64)
-    for kind, ids in ((Partner.PEDESTRIAN, episode.pedestrian_person), (Partner.AGENT, episode.agent_person)):
-        here = episode.contact_partner_kind[rows] == kind
-        result[here] = ids[episode.contact_partner[rows][here]]
-    return result
-
-
-def partner_words(episode: Episode, rows: Index) -> list[str]:
+def partner_words(episode: Episode, rows: IntArray) -> list[str]:
     """Kinds of the partners: "person" or "robot".
 
     Args:
@@ -52,7 +33,7 @@ def partner_words(episode: Episode, rows: Index) -> list[str]:
     return ["person" if kind == Partner.PEDESTRIAN else "robot" for kind in kinds]
 
 
-def severities(episode: Episode, rows: Index) -> list[str]:
+def severities(episode: Episode, rows: IntArray) -> list[str]:
     """Closing speed and peak force, the latter where there was physics.
 
     Args:

@@ -4,15 +4,15 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from socialnav_mj.episode import Episode, Partner
+from socialnav_mj.episode import Episode, IntArray, Partner
 from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.contacts import partner_person
 from socialnav_mj.trace import layout as look
-from socialnav_mj.trace.events import partner_person, partner_words, severities, touch_rows
+from socialnav_mj.trace.events import partner_words, severities, touch_rows
 from socialnav_mj.trace.lanes import first_touch_time
 from socialnav_mj.trace.sink import Sink
 
 Mask = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 
 def bounds(episode: Episode) -> tuple[Array, Array]:
@@ -30,7 +30,7 @@ def bounds(episode: Episode) -> tuple[Array, Array]:
     return places.min(axis=0) - 0.5, places.max(axis=0) + 0.5
 
 
-def write_scene(episode: Episode, sink: Sink, chosen: Index, low: Array, high: Array) -> None:
+def write_scene(episode: Episode, sink: Sink, chosen: IntArray, low: Array, high: Array) -> None:
     """Write everything that the spatial views show.
 
     Args:
@@ -109,7 +109,7 @@ def _goals(episode: Episode, sink: Sink) -> None:
     _hide(sink, "/scene/goals", episode.time[rows[counts == 0]])
 
 
-def _names(episode: Episode, sink: Sink, chosen: Index) -> None:
+def _names(episode: Episode, sink: Sink, chosen: IntArray) -> None:
     present = np.isfinite(episode.agent_heading[:, chosen])
     _, item = np.nonzero(present)
     points = rr.Points3D.columns(

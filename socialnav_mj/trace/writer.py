@@ -26,11 +26,10 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.episode import Episode, EpisodeError, Outcome, Partner
+from socialnav_mj.episode import Episode, EpisodeError, IntArray, Outcome, Partner
 from socialnav_mj.files import written_whole
 from socialnav_mj.metrics.collisions import collisions
 from socialnav_mj.metrics.navigation import success
@@ -40,8 +39,6 @@ from socialnav_mj.trace.events import events, touch_rows
 from socialnav_mj.trace.lanes import Change, assign_lanes, policy_changes, state_changes
 from socialnav_mj.trace.scene import bounds, write_scene
 from socialnav_mj.trace.sink import Sink
-
-Index = NDArray[np.int64]
 
 
 def write_trace(episode: Episode, path: str | Path) -> Path:
@@ -61,7 +58,7 @@ def write_trace(episode: Episode, path: str | Path) -> Path:
     return Path(path)
 
 
-def chosen_agents(episode: Episode) -> Index:
+def chosen_agents(episode: Episode) -> IntArray:
     """Robots to follow closely: the hardest collisions first, then time-outs, then the longest on the way.
 
     Args:
@@ -108,7 +105,7 @@ def _write(episode: Episode, path: Path) -> None:
         sink.close()
 
 
-def _run(episode: Episode, sink: Sink, name: str, chosen: Index) -> None:
+def _run(episode: Episode, sink: Sink, name: str, chosen: IntArray) -> None:
     metadata, recording = episode.metadata, episode.metadata["recording"]
     values = {
         "controller": metadata["controller"],
@@ -125,7 +122,7 @@ def _run(episode: Episode, sink: Sink, name: str, chosen: Index) -> None:
     sink.static("/run", rr.TextDocument(_summary(episode, name, chosen), media_type="text/markdown"))
 
 
-def _summary(episode: Episode, name: str, chosen: Index) -> str:
+def _summary(episode: Episode, name: str, chosen: IntArray) -> str:
     metadata, recording = episode.metadata, episode.metadata["recording"]
     touches = touch_rows(episode)
     with_people = int((episode.contact_partner_kind[touches] == Partner.PEDESTRIAN).sum())
@@ -158,7 +155,7 @@ def _summary(episode: Episode, name: str, chosen: Index) -> str:
     )
 
 
-def _series(episode: Episode, sink: Sink, chosen: Index) -> None:
+def _series(episode: Episode, sink: Sink, chosen: IntArray) -> None:
     nearest = nearest_pedestrian_distance(episode)
     speed = np.hypot(episode.agent_velocity[..., 0], episode.agent_velocity[..., 1])
     n, people = episode.n_agents, episode.agent_person
@@ -191,7 +188,7 @@ def _lanes(
     what: str,
     changes: Sequence[Sequence[Change]],
     colours: dict[str, look.Colour],
-    chosen: Index,
+    chosen: IntArray,
 ) -> None:
     """The chosen agents in a lane each, and all agents packed, with their numbers as labels."""
     person = episode.agent_person
