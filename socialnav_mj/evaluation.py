@@ -17,8 +17,9 @@ from socialnav_mj.episode import EpisodeError, check_name, read_header
 from socialnav_mj.files import write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
+from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
-from socialnav_mj.rollout import recording_metadata, rollout
+from socialnav_mj.rollout import rollout
 
 
 class EvaluationError(RuntimeError):

@@ -10,8 +10,9 @@ from socialnav_mj.cast import cast_recording
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.geometry import Array, wrap_angle
+from socialnav_mj.provenance import episode_metadata, state_hash
+from socialnav_mj.recorder import contact_columns, recorded_series
 from socialnav_mj.recordings import Recording
-from socialnav_mj.rollout import contact_columns, episode_metadata, recorded_series, state_hash
 
 HUMAN = "human"
 _FASTEST_APPROACH = 8.0

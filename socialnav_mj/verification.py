@@ -18,12 +18,13 @@ from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import Episode
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
+from socialnav_mj.provenance import package_versions
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.catalogue import catalogue
 from socialnav_mj.report.agents import check_names
 from socialnav_mj.report.writer import RUN_FILE, read_run_file, report_tables
 from socialnav_mj.resources import assets_folder
-from socialnav_mj.rollout import package_versions, rollout
+from socialnav_mj.rollout import rollout
 
 MAX_PHYSICS_STEPS = 10_000_000
 """More are not simulated for one file, whatever it says: 28 hours at the default step."""

@@ -18,11 +18,11 @@ PACKAGES = ("socialnav_mj", "tasks")
 ROWS = (
     {"resources", "geometry", "config", "files", "processes"},
     {"recordings"},
-    {"observation", "episode", "features"},
+    {"observation", "episode", "features", "provenance"},
     {"cast", "scene", "physics", "task", "environment"},
     {"tasks"},
     {"controllers"},
-    {"rollout", "human", "evaluation"},
+    {"recorder", "rollout", "human", "evaluation"},
     {"metrics"},
     {"trace"},
     {"report"},

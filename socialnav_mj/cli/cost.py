@@ -37,8 +37,8 @@ class Bench:
         """Measure and print."""
         from socialnav_mj.benchmark import measure
         from socialnav_mj.files import write_whole
+        from socialnav_mj.provenance import PACKAGES, package_versions, recording_metadata
         from socialnav_mj.recordings import load_recording
-        from socialnav_mj.rollout import PACKAGES, package_versions
 
         recording = load_recording(self.dataset, data_dir=self.data_dir)
         costs = []
@@ -75,7 +75,7 @@ class Bench:
         if self.out is not None:
             content = {
                 "command": shlex.join(sys.argv),
-                "recording": {"name": recording.name, "variant": recording.variant, "checksum": recording.checksum},
+                "recording": recording_metadata(recording),
                 "versions": package_versions(PACKAGES),
                 "costs": [asdict(cost) for cost in costs],
             }

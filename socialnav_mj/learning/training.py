@@ -25,9 +25,10 @@ from socialnav_mj.learning.experts import Demonstrations, demonstrate
 from socialnav_mj.learning.policy_file import save_policy
 from socialnav_mj.learning.replay_irl import ReplayIRL
 from socialnav_mj.learning.shipping import BEST
+from socialnav_mj.provenance import package_versions, recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.window import window
-from socialnav_mj.rollout import package_versions, rollout
+from socialnav_mj.rollout import rollout
 
 PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
 CHECKPOINT, BUFFER, HISTORY, CONFIG = (
@@ -248,10 +249,7 @@ class _Checkpoints(BaseCallback):
             "scene_steps": scene_steps,
             "transitions": model.replay_buffer.size(),
             "updates": model.updates,
-            "recordings": [
-                {"name": r.name, "variant": r.variant, "checksum": r.checksum, "frame_rate": r.frame_rate}
-                for r in self._recordings
-            ],
+            "recordings": [recording_metadata(recording) for recording in self._recordings],
             "versions": package_versions(PACKAGES),
         }
         save_policy(model, latest, card)

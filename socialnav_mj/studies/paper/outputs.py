@@ -10,10 +10,10 @@ import pyarrow.compute
 
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_json, write_whole
+from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
-from socialnav_mj.rollout import recording_metadata
 from socialnav_mj.studies.files import level_rows, provenance_of, write_csv
 from socialnav_mj.studies.held_out import held_out_levels, period_of_people
 from socialnav_mj.studies.levels import LevelTable, levels

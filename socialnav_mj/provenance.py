@@ -1,0 +1,84 @@
+"""Where a result comes from: versions, recording and configuration, and the hash of what was simulated."""
+
+import hashlib
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from socialnav_mj.config import Scenario
+from socialnav_mj.geometry import Array
+from socialnav_mj.recordings import Recording
+
+PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "scipy")
+"""Whose versions travel in every result."""
+
+
+def state_hash(*arrays: Array) -> str:
+    """SHA-256 of arrays' bytes.
+
+    Args:
+        *arrays: In order.
+
+    Returns:
+        Hexadecimal digits.
+    """
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> dict[str, Any]:
+    """All that makes an episode traceable.
+
+    Args:
+        recording: The crowd.
+        scenario: The resolved scenario.
+        **rest: Further JSON values: controller, controller_config, scenario_name, steps, state_hash.
+
+    Returns:
+        The value of `Episode.metadata`.
+    """
+    return {
+        **rest,
+        "scenario": scenario.as_dict(),
+        "draw": scenario.seed,
+        "recording": recording_metadata(recording),
+        "versions": package_versions(PACKAGES),
+    }
+
+
+def recording_metadata(recording: Recording) -> dict[str, Any]:
+    """What tells a recording from others.
+
+    Args:
+        recording: The crowd.
+
+    Returns:
+        JSON values.
+    """
+    return {
+        "name": recording.name,
+        "variant": recording.variant,
+        "checksum": recording.checksum,
+        "frame_rate": recording.frame_rate,
+    }
+
+
+def package_versions(names: tuple[str, ...]) -> dict[str, str]:
+    """Versions of installed packages.
+
+    Args:
+        names: Distribution names.
+
+    Returns:
+        Version by name; "not installed" for those that are not.
+    """
+    found = {}
+    for name in names:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

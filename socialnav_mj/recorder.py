@@ -1,0 +1,193 @@
+"""How an episode's record is filled: slot by slot during a rollout, and with what the recording says of its people."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.cast import NOBODY, Cast
+from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
+from socialnav_mj.geometry import Array
+from socialnav_mj.recordings import Recording
+from socialnav_mj.task import CrowdTask
+
+
+class Recorder:
+    """Gathers what happens, slot by slot, and turns it into the record of agents."""
+
+    def __init__(self, task: CrowdTask) -> None:
+        """Begin with nothing.
+
+        Args:
+            task: Is looked at whenever something is noted; it has to be reset before the first sample.
+        """
+        self._task = task
+        self._samples: list[tuple[IntArray, Array, Array, Array, Array]] = []
+        self._actions: list[tuple[IntArray, Array, IntArray]] = []
+
+    def note_sample(self) -> None:
+        """Keep the state of every agent under way, at the reset and after every control step."""
+        sample = self._task.sample
+        slots = np.flatnonzero(sample.agent != NOBODY)
+        self._samples.append(
+            (
+                sample.agent[slots],
+                sample.position[slots],
+                sample.heading[slots],
+                sample.velocity[slots],
+                sample.yaw_rate[slots],
+            )
+        )
+
+    def note_action(self, agent: IntArray, action: Array, policy: IntArray) -> None:
+        """Keep what was commanded between two samples.
+
+        Args:
+            agent: Index of the agent in each slot before the step, `NOBODY` for none, shape (n_slots,).
+            action: Wheel speeds, shape (n_slots, 2) [rad/s].
+            policy: Index of the policy that chose them, shape (n_slots,).
+        """
+        slots = np.flatnonzero(agent != NOBODY)
+        self._actions.append((agent[slots], action[slots], policy[slots]))
+
+    def episode(self, *, policies: tuple[str, ...], metadata: dict[str, Any]) -> Episode:
+        """The record of all agents, those that never spawned included.
+
+        Args:
+            policies: Names that the noted indices stand for.
+            metadata: Of the episode, see `provenance.episode_metadata`.
+
+        Returns:
+            With T = number of noted samples.
+        """
+        task, cast, dt = self._task, self._task.cast, self._task.scenario.control_timestep
+        t, n = len(self._samples), cast.n_agents
+        position, velocity = np.full((t, n, 2), np.nan), np.full((t, n, 2), np.nan)
+        heading, yaw_rate = np.full((t, n), np.nan), np.full((t, n), np.nan)
+        wheel_speed, policy = np.full((t, n, 2), np.nan), np.full((t, n), -1, dtype=np.int64)
+        for k, (agent, *values) in enumerate(self._samples):
+            position[k, agent], heading[k, agent], velocity[k, agent], yaw_rate[k, agent] = values
+        for k, (agent, action, chosen) in enumerate(self._actions):
+            wheel_speed[k, agent], policy[k, agent] = action, chosen
+        spawned = task.spawn_step >= 0
+        end_step = np.where(task.end_step >= 0, task.end_step, t - 1)
+        spawn_time = np.where(spawned, task.spawn_step * dt, np.nan)
+        unfinished = np.where(spawned, Outcome.UNFINISHED, Outcome.NEVER_SPAWNED)
+        time = np.arange(t, dtype=float) * dt
+        return Episode(
+            time=time,
+            agent_person=cast.agent_person.copy(),
+            agent_start=cast.agent_start.copy(),
+            agent_goal=cast.agent_goal.copy(),
+            agent_appear_time=cast.agent_appear_step.astype(float) * dt,
+            agent_spawn_time=spawn_time,
+            agent_deadline=spawn_time + cast.agent_allowed_steps * dt,
+            agent_end_time=np.where(spawned, end_step * dt, np.nan),
+            agent_outcome=np.where(task.outcome >= 0, task.outcome, unfinished).astype(np.int64),
+            agent_position=position,
+            agent_heading=heading,
+            agent_velocity=velocity,
+            agent_yaw_rate=yaw_rate,
+            agent_wheel_speed=wheel_speed,
+            agent_policy=policy,
+            **_pedestrian_series(task.recording, cast, time, dt),
+            **self._contacts(),
+            policies=policies,
+            metadata=metadata,
+        )
+
+    def _contacts(self) -> dict[str, NDArray[Any]]:
+        """Columns of the contact log; a touch between two agents gives a row to each."""
+        step = self._task.scenario.physics_timestep
+        rows = []
+        for collision in self._task.collisions:
+            touch = collision.touch
+            shared = (touch.last_time - touch.time + step, touch.position, touch.impulse, touch.peak_force)
+            sides = [
+                (
+                    collision.agent,
+                    collision.partner,
+                    touch.normal,
+                    touch.agent_heading,
+                    touch.agent_velocity,
+                    touch.partner_velocity,
+                )
+            ]
+            if touch.kind == Partner.AGENT:
+                sides.append(
+                    (
+                        collision.partner,
+                        collision.agent,
+                        -touch.normal,
+                        touch.partner_heading,
+                        touch.partner_velocity,
+                        touch.agent_velocity,
+                    )
+                )
+            rows += [(touch.time, agent, int(touch.kind), partner, *rest, *shared) for agent, partner, *rest in sides]
+        return contact_columns(rows)
+
+
+def contact_columns(rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
+    """The episode's contact columns from rows.
+
+    Args:
+        rows: (time, agent, partner kind, partner, normal, agent heading, agent velocity, partner velocity, duration,
+            position, impulse, peak force) of each contact, in any order.
+
+    Returns:
+        Keyword arguments of `Episode`, ordered by time, agent, partner.
+    """
+    rows = sorted(rows, key=lambda row: row[:4])
+    names = ["time", "agent", "partner_kind", "partner", "normal", "agent_heading", "agent_velocity"]
+    names += ["partner_velocity", "duration", "position", "impulse", "peak_force"]
+    shapes = {"normal": 2, "agent_velocity": 2, "partner_velocity": 2, "position": 2}
+    columns = list(zip(*rows, strict=True)) if rows else [()] * len(names)
+    result: dict[str, NDArray[Any]] = {}
+    for name, column in zip(names, columns, strict=True):
+        kind = np.int64 if name in ("agent", "partner_kind", "partner") else np.float64
+        shape = (len(rows), shapes[name]) if name in shapes else (len(rows),)
+        result[f"contact_{name}"] = np.array(column, dtype=kind).reshape(shape)
+    return result
+
+
+def _pedestrian_series(recording: Recording, cast: Cast, time: Array, dt: float) -> dict[str, NDArray[Any]]:
+    position, velocity, heading = recorded_series(
+        recording, cast.pedestrian_index, cast.pedestrian_first_step, cast.pedestrian_last_step, len(time), dt
+    )
+    return {
+        "pedestrian_person": cast.pedestrian_person.copy(),
+        "pedestrian_position": position,
+        "pedestrian_velocity": velocity,
+        "pedestrian_heading": heading,
+    }
+
+
+def recorded_series(
+    recording: Recording,
+    index: IntArray,
+    first: IntArray,
+    last: IntArray,
+    steps: int,
+    dt: float,
+) -> tuple[Array, Array, Array]:
+    """Recorded motion of some people at the control steps at which they are there.
+
+    Args:
+        recording: The crowd.
+        index: Indices into it, shape (k,).
+        first: First control step of each, shape (k,).
+        last: Last control step, included, shape (k,).
+        steps: Number of control steps of the result.
+        dt: Control time step [s].
+
+    Returns:
+        Position (steps, k, 2) [m], velocity (steps, k, 2) [m/s] and heading (steps, k) [rad]; NaN where absent.
+    """
+    position, heading = np.full((steps, len(index), 2), np.nan), np.full((steps, len(index)), np.nan)
+    velocity = np.full_like(position, np.nan)
+    for column, person in enumerate(index):
+        rows = np.arange(first[column], min(last[column] + 1, steps))
+        where, speed, facing = recording.person(int(person)).at(rows * dt)
+        position[rows, column], velocity[rows, column], heading[rows, column] = where, speed, facing
+    return position, velocity, heading
