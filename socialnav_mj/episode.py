@@ -5,14 +5,18 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from socialnav_mj.contact import Partner
+from socialnav_mj.episode_checks import EpisodeError, check_arrays, check_values
 from socialnav_mj.files import written_whole
+from socialnav_mj.outcome import Outcome
+
+__all__ = ["Array", "Episode", "EpisodeError", "IntArray", "Outcome", "Partner", "read_header"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -20,32 +24,6 @@ IntArray = NDArray[np.int64]
 FORMAT = "socialnav_mj.episode/2"
 MAX_BYTES = 1 << 30
 """An episode file whose arrays are larger is not read: a small file can ask for any amount of memory."""
-
-
-class Outcome(IntEnum):
-    """How an agent's run ended."""
-
-    ARRIVED = 0
-    """It came within the goal radius."""
-    TIMED_OUT = 1
-    """Its deadline passed."""
-    COLLIDED = 2
-    """It was taken out at its first collision (on_collision="retire" only)."""
-    UNFINISHED = 3
-    """The episode was stopped while it was under way."""
-    NEVER_SPAWNED = 4
-    """Its place was never free."""
-
-
-class Partner(IntEnum):
-    """Whom an agent touched."""
-
-    PEDESTRIAN = 0
-    AGENT = 1
-
-
-class EpisodeError(ValueError):
-    """A file is not an episode of ours, or is damaged."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,77 +109,8 @@ class Episode:
     state_hash."""
 
     def __post_init__(self) -> None:
-        t, n, m, k = len(self.time), len(self.agent_person), len(self.pedestrian_person), len(self.contact_time)
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not isinstance(value, np.ndarray):
-                continue
-            shape = _expected_shape(field.name, t=t, n=n, m=m, k=k)
-            if value.shape != shape:
-                raise EpisodeError(f"{field.name} has shape {value.shape}; expected {shape}")
-            kind = "i" if field.name in _INTEGER_FIELDS else "f"
-            if value.dtype.kind != kind or value.dtype.itemsize != 8:
-                raise EpisodeError(
-                    f"{field.name} has type {value.dtype}; expected {'int64' if kind == 'i' else 'float64'}"
-                )
-            value.flags.writeable = False
-        self._check_values()
-
-    def _check_values(self) -> None:
-        n, m = len(self.agent_person), len(self.pedestrian_person)
-        if not len(self.time) or not np.all(np.isfinite(self.time)):
-            raise EpisodeError("time must be finite and hold a sample at least")
-        if not np.allclose(np.diff(self.time), self._stated_timestep(), rtol=0.0, atol=_SAME_TIME):
-            raise EpisodeError(f"time must be spaced by the control time step of {self.control_timestep} s")
-        for name in ("agent_person", "pedestrian_person"):
-            if np.any(np.diff(getattr(self, name)) <= 0):
-                raise EpisodeError(f"{name} must be ascending and unique")
-        if np.intersect1d(self.agent_person, self.pedestrian_person).size:
-            raise EpisodeError("a person cannot be replaced and replayed at once")
-        if not np.isin(self.agent_outcome, list(Outcome)).all():
-            raise EpisodeError(f"agent_outcome holds values outside {[int(o) for o in Outcome]}")
-        if not np.isin(self.contact_partner_kind, list(Partner)).all():
-            raise EpisodeError(f"contact_partner_kind holds values outside {[int(p) for p in Partner]}")
-        if np.any(self.agent_policy >= len(self.policies)) or np.any(self.agent_policy < -1):
-            raise EpisodeError(f"agent_policy holds values outside -1..{len(self.policies) - 1}")
-        limit = np.where(self.contact_partner_kind == Partner.AGENT, n, m)
-        if np.any((self.contact_agent < 0) | (self.contact_agent >= n)):
-            raise EpisodeError("contact_agent is out of range")
-        if np.any((self.contact_partner < 0) | (self.contact_partner >= limit)):
-            raise EpisodeError("contact_partner is out of range")
-        own = (self.contact_partner_kind == Partner.AGENT) & (self.contact_partner == self.contact_agent)
-        if own.any():
-            raise EpisodeError("contact_partner of an agent is the agent itself")
-        order = np.lexsort((self.contact_partner, self.contact_partner_kind, self.contact_agent, self.contact_time))
-        if not np.isfinite(self.contact_time).all() or np.any(np.diff(order) < 0):
-            raise EpisodeError("contacts must have a finite time and be ordered by time, agent, partner kind, partner")
-        self._check_presence()
-
-    def _check_presence(self) -> None:
-        spawned = self.agent_outcome != Outcome.NEVER_SPAWNED
-        for name in ("agent_spawn_time", "agent_end_time"):
-            if not np.array_equal(spawned, np.isfinite(getattr(self, name))):
-                raise EpisodeError(f"{name} must be NaN for exactly the agents that never spawned")
-        if np.any(self.agent_end_time < self.agent_spawn_time):
-            raise EpisodeError("agent_end_time must not be before agent_spawn_time")
-        after = self.time[:, None] >= self.agent_spawn_time - _SAME_TIME
-        before = self.time[:, None] <= self.agent_end_time + _SAME_TIME
-        for name in ("agent_position", "agent_heading", "agent_velocity", "agent_yaw_rate"):
-            if not _is_finite_where(getattr(self, name), after & before):
-                raise EpisodeError(f"{name} must be finite from spawn to end, and NaN elsewhere")
-        under_way = after & (self.time[:, None] < self.agent_end_time - _SAME_TIME)
-        if not np.array_equal(self.agent_policy >= 0, under_way):
-            raise EpisodeError("agent_policy must be -1 except from the spawn up to, not including, the end")
-        there = np.isfinite(self.pedestrian_heading)
-        for name in ("pedestrian_position", "pedestrian_velocity"):
-            if not _is_finite_where(getattr(self, name), there):
-                raise EpisodeError(f"{name} must be finite where pedestrian_heading is, and NaN elsewhere")
-
-    def _stated_timestep(self) -> float:
-        try:
-            return self.control_timestep
-        except (KeyError, TypeError, ValueError) as error:
-            raise EpisodeError("metadata lack scenario.control_timestep") from error
+        check_arrays(self)
+        check_values(self)
 
     @property
     def n_agents(self) -> int:
@@ -356,57 +265,3 @@ def _digest(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> str:
         digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
-
-
-def _is_finite_where(values: Array, expected: NDArray[np.bool_]) -> bool:
-    """Whether values (..., or with a last axis of two coordinates) are finite where expected and NaN elsewhere."""
-    if values.ndim > expected.ndim:
-        expected = np.broadcast_to(expected[..., None], values.shape)
-    return np.array_equal(np.isfinite(values), expected) and np.array_equal(np.isnan(values), ~expected)
-
-
-_SAME_TIME = 1e-6
-"""Times this near are the same; rounding of sums of time steps [s]."""
-
-_INTEGER_FIELDS = {
-    "agent_person",
-    "agent_outcome",
-    "agent_policy",
-    "pedestrian_person",
-    "contact_agent",
-    "contact_partner_kind",
-    "contact_partner",
-}
-_PER_STEP = {
-    "agent_position",
-    "agent_heading",
-    "agent_velocity",
-    "agent_yaw_rate",
-    "agent_wheel_speed",
-    "agent_policy",
-    "pedestrian_position",
-    "pedestrian_heading",
-    "pedestrian_velocity",
-}
-_PLANAR = {
-    "agent_start",
-    "agent_goal",
-    "agent_position",
-    "agent_velocity",
-    "agent_wheel_speed",
-    "pedestrian_position",
-    "pedestrian_velocity",
-    "contact_position",
-    "contact_normal",
-    "contact_agent_velocity",
-    "contact_partner_velocity",
-}
-
-
-def _expected_shape(name: str, *, t: int, n: int, m: int, k: int) -> tuple[int, ...]:
-    if name == "time":
-        return (t,)
-    shape: tuple[int, ...] = ({"agent": n, "pedestrian": m, "contact": k}[name.split("_")[0]],)
-    if name in _PER_STEP:
-        shape = (t, *shape)
-    return (*shape, 2) if name in _PLANAR else shape

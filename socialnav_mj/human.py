@@ -1,17 +1,17 @@
 """The recorded people scored as if they were the agents: the ceiling, and the honest comparison."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.cast import cast_recording
 from socialnav_mj.config import Scenario
+from socialnav_mj.contact import Contact, contact_columns
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.geometry import Array, wrap_angle
 from socialnav_mj.provenance import episode_metadata, state_hash
-from socialnav_mj.recorder import contact_columns, recorded_series
+from socialnav_mj.recorder import recorded_series
 from socialnav_mj.recordings import Recording
 
 HUMAN = "human"
@@ -63,7 +63,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
             for k, i in enumerate(cast.pedestrian_index)
         ),
     ]
-    rows = _touches(recording, scenario, people, np.concatenate([position, there], axis=1))
+    contacts = _contacts(recording, scenario, people, np.concatenate([position, there], axis=1))
     n = cast.n_agents
     digest = state_hash(position, velocity)
     return Episode(
@@ -86,7 +86,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
         pedestrian_position=there,
         pedestrian_heading=facing,
         pedestrian_velocity=speed,
-        **contact_columns(rows),
+        **contact_columns(contacts),
         policies=(HUMAN,),
         metadata=episode_metadata(
             recording,
@@ -119,11 +119,11 @@ def _yaw_rate(heading: Array, dt: float) -> Array:
     return np.concatenate([np.nan_to_num(turned), np.zeros_like(heading[:1])])
 
 
-def _touches(recording: Recording, scenario: Scenario, people: list[_Person], position: Array) -> list[tuple[Any, ...]]:
-    """Rows of `contact_columns`, from each agent's side."""
+def _contacts(recording: Recording, scenario: Scenario, people: list[_Person], position: Array) -> list[Contact]:
+    """Touches as each agent among two people would have felt them, without forces."""
     limit, dt, h = scenario.contact_distance, scenario.control_timestep, scenario.physics_timestep
     pairs = _close_pairs(position, limit + _FASTEST_APPROACH * dt)
-    rows: list[tuple[Any, ...]] = []
+    contacts: list[Contact] = []
     for a, b in pairs:
         one, two = people[a], people[b]
         if one.kind == two.kind == Partner.PEDESTRIAN:
@@ -137,16 +137,28 @@ def _touches(recording: Recording, scenario: Scenario, people: list[_Person], po
             if start == 0:
                 continue
             normal = (y[start] - x[start]) / max(float(apart[start]), 1e-9)
-            shared = ((stop - start) * h, 0.5 * (x[start] + y[start]), np.nan, np.nan)
             before = start - 1
             sides = [(one, two, normal, facing[before], u[before], w[before])]
             sides.append((two, one, -normal, other_facing[before], w[before], u[before]))
-            rows += [
-                (float(times[start]), agent.row, int(other.kind), other.row, n, head, mine, theirs, *shared)
-                for agent, other, n, head, mine, theirs in sides
+            contacts += [
+                Contact(
+                    time=float(times[start]),
+                    agent=agent.row,
+                    partner_kind=other.kind,
+                    partner=other.row,
+                    duration=(stop - start) * h,
+                    position=0.5 * (x[start] + y[start]),
+                    normal=direction,
+                    agent_heading=float(heading),
+                    agent_velocity=own_velocity,
+                    partner_velocity=other_velocity,
+                    impulse=np.nan,
+                    peak_force=np.nan,
+                )
+                for agent, other, direction, heading, own_velocity, other_velocity in sides
                 if agent.kind == Partner.AGENT
             ]
-    return rows
+    return contacts
 
 
 def _close_pairs(position: Array, distance: float) -> list[tuple[int, int]]:

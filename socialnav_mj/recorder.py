@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.cast import NOBODY, Cast
+from socialnav_mj.contact import Contact, contact_columns
 from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
 from socialnav_mj.geometry import Array
 from socialnav_mj.recordings import Recording
@@ -99,56 +100,27 @@ class Recorder:
     def _contacts(self) -> dict[str, NDArray[Any]]:
         """Columns of the contact log; a touch between two agents gives a row to each."""
         step = self._task.scenario.physics_timestep
-        rows = []
+        contacts = []
         for collision in self._task.collisions:
             touch = collision.touch
-            shared = (touch.last_time - touch.time + step, touch.position, touch.impulse, touch.peak_force)
-            sides = [
-                (
-                    collision.agent,
-                    collision.partner,
-                    touch.normal,
-                    touch.agent_heading,
-                    touch.agent_velocity,
-                    touch.partner_velocity,
-                )
-            ]
+            contact = Contact(
+                time=touch.time,
+                agent=collision.agent,
+                partner_kind=touch.kind,
+                partner=collision.partner,
+                duration=touch.last_time - touch.time + step,
+                position=touch.position,
+                normal=touch.normal,
+                agent_heading=touch.agent_heading,
+                agent_velocity=touch.agent_velocity,
+                partner_velocity=touch.partner_velocity,
+                impulse=touch.impulse,
+                peak_force=touch.peak_force,
+            )
+            contacts.append(contact)
             if touch.kind == Partner.AGENT:
-                sides.append(
-                    (
-                        collision.partner,
-                        collision.agent,
-                        -touch.normal,
-                        touch.partner_heading,
-                        touch.partner_velocity,
-                        touch.agent_velocity,
-                    )
-                )
-            rows += [(touch.time, agent, int(touch.kind), partner, *rest, *shared) for agent, partner, *rest in sides]
-        return contact_columns(rows)
-
-
-def contact_columns(rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
-    """The episode's contact columns from rows.
-
-    Args:
-        rows: (time, agent, partner kind, partner, normal, agent heading, agent velocity, partner velocity, duration,
-            position, impulse, peak force) of each contact, in any order.
-
-    Returns:
-        Keyword arguments of `Episode`, ordered by time, agent, partner.
-    """
-    rows = sorted(rows, key=lambda row: row[:4])
-    names = ["time", "agent", "partner_kind", "partner", "normal", "agent_heading", "agent_velocity"]
-    names += ["partner_velocity", "duration", "position", "impulse", "peak_force"]
-    shapes = {"normal": 2, "agent_velocity": 2, "partner_velocity": 2, "position": 2}
-    columns = list(zip(*rows, strict=True)) if rows else [()] * len(names)
-    result: dict[str, NDArray[Any]] = {}
-    for name, column in zip(names, columns, strict=True):
-        kind = np.int64 if name in ("agent", "partner_kind", "partner") else np.float64
-        shape = (len(rows), shapes[name]) if name in shapes else (len(rows),)
-        result[f"contact_{name}"] = np.array(column, dtype=kind).reshape(shape)
-    return result
+                contacts.append(contact.seen_by_partner(touch.partner_heading))
+        return contact_columns(contacts)
 
 
 def _pedestrian_series(recording: Recording, cast: Cast, time: Array, dt: float) -> dict[str, NDArray[Any]]:

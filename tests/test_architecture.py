@@ -18,7 +18,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 ROWS = (
     {"resources", "geometry", "config", "files", "processes"},
     {"recordings"},
-    {"observation", "episode", "features", "provenance"},
+    {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
     {"cast", "scene", "physics", "task", "environment"},
     {"tasks"},
     {"controllers"},
