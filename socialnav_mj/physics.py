@@ -1,7 +1,5 @@
 """What is true in the scene: poses, velocities and contacts of robots and people."""
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 from dm_control.mujoco import Physics as MujocoPhysics
@@ -9,44 +7,14 @@ from dm_control.mujoco.wrapper import MjData, MjModel
 from dm_control.rl.control import PhysicsError
 from numpy.typing import NDArray
 
-from socialnav_mj.episode import IntArray, Partner
+from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
-from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, REARM_TIME, agent_name, pedestrian_name
+from socialnav_mj.scene import REARM_TIME, agent_name
+from socialnav_mj.scene_index import index_scene
+from socialnav_mj.touch import Touch, TouchLog
 
 _PARKING_DEPTH = 20.0
 """How far below the floor bodies wait that are not in the scene [m]."""
-
-
-@dataclass(kw_only=True, slots=True)
-class Touch:
-    """A contact between an agent and another body, from its first to its last physics step."""
-
-    agent: int
-    """Slot of the agent; of two agents the lower."""
-    kind: Partner
-    """What it touched."""
-    partner: int
-    """Slot of the other agent or of the pedestrian."""
-    time: float
-    """First physics step [s]."""
-    last_time: float
-    """Last physics step that was seen so far [s]."""
-    position: Array
-    """(2,) at first touch [m]."""
-    normal: Array
-    """(2,) unit vector from the agent to its partner at first touch."""
-    agent_heading: float
-    """At first touch [rad]."""
-    partner_heading: float
-    """At first touch; a pedestrian's is that of the control step [rad]."""
-    agent_velocity: Array
-    """(2,) just before [m/s]."""
-    partner_velocity: Array
-    """(2,) just before; a pedestrian's is the recorded one, not the mocap body's, which the solver takes as 0 [m/s]."""
-    impulse: float = 0.0
-    """Integral of the normal force so far [N s]."""
-    peak_force: float = 0.0
-    """Largest normal force so far [N]."""
 
 
 class Physics(MujocoPhysics):
@@ -74,39 +42,24 @@ class Physics(MujocoPhysics):
 
     def _reload_from_data(self, data: MjData) -> None:
         model = data.model.ptr
-        names = [model.body(i).name for i in range(model.nbody)]
-        self.n_agents = sum(name.startswith(AGENT_PREFIX) and name.endswith("/robot") for name in names)
-        self.n_pedestrians = sum(name.startswith(PEDESTRIAN_PREFIX) and name.endswith("/pedestrian") for name in names)
-        joints = [model.joint(agent_name(i) + "root") for i in range(self.n_agents)]
-        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.int64)
-        self._qvel = np.array([joint.dofadr[0] for joint in joints], dtype=np.int64)
-        self._ctrl = np.array(
-            [[model.actuator(agent_name(i) + a).id for a in ("forward", "yaw")] for i in range(self.n_agents)]
-        )
-        root = np.asarray(model.body_rootid)
-        robots = np.array([model.body(agent_name(i) + "robot").id for i in range(self.n_agents)])
-        people = np.array([model.body(pedestrian_name(i) + "pedestrian").id for i in range(self.n_pedestrians)])
-        if not np.array_equal(model.body_mocapid[people], np.arange(model.nmocap)) or model.geom("floor").id != 0:
-            raise ValueError("the scene must have the floor as its first geom and the pedestrians as its mocap bodies")
-        self._agent_bodies = [np.flatnonzero(root == body) for body in robots]
-        self._agent_geoms = [np.flatnonzero(root[model.geom_bodyid] == body) for body in robots]
-        self._agent_dofs = [np.flatnonzero(root[model.dof_bodyid] == body) for body in robots]
-        self._agent_joints = [np.flatnonzero(root[model.jnt_bodyid] == body) for body in robots]
-        self._pedestrian_geom = np.array(
-            [model.geom(pedestrian_name(i) + "body").id for i in range(self.n_pedestrians)]
-        )
+        self._index = index_scene(model)
         self._bits = np.array(model.geom_user[:, :2], dtype=np.int32)
-        self._rearm_time = float(model.numeric(REARM_TIME).data[0])
-        self._owner = np.full(model.ngeom, -1, dtype=np.int64)
-        for slot in range(self.n_agents):
-            self._owner[model.geom(agent_name(slot) + "bumper").id] = slot
-        self._owner[self._pedestrian_geom] = self.n_agents + np.arange(self.n_pedestrians)
         self._mocap_pos, self._mocap_quat = data.ptr.mocap_pos, data.ptr.mocap_quat
         self._velocity_before = np.zeros(model.nv)
         self._path: Array | None = None
         self._path_velocity: Array | None = None
-        self._forget_touches()
+        self._touches = TouchLog(self._index, rearm_time=float(model.numeric(REARM_TIME).data[0]))
         super()._reload_from_data(data)
+
+    @property
+    def n_agents(self) -> int:
+        """Robots in the pool."""
+        return self._index.n_agents
+
+    @property
+    def n_pedestrians(self) -> int:
+        """Mocap bodies in the pool."""
+        return self._index.n_pedestrians
 
     def reset(self, keyframe_id: int | None = None) -> None:
         """Park every slot and forget every contact.
@@ -115,16 +68,11 @@ class Physics(MujocoPhysics):
             keyframe_id: See dm_control.
         """
         super().reset(keyframe_id)
-        self._forget_touches()
+        self._touches.forget()
         self._path = self._path_velocity = None
         for slot in range(self.n_agents):
             self.park_agent(slot)
         self.park_pedestrians(np.arange(self.n_pedestrians))
-
-    def _forget_touches(self) -> None:
-        self._touches: dict[tuple[int, int], Touch] = {}
-        self._new_touches: list[Touch] = []
-        self._force = np.zeros(6)
 
     # Robots
 
@@ -134,7 +82,7 @@ class Physics(MujocoPhysics):
         Returns:
             Shape (n_agents, 2) [m].
         """
-        return self.data.qpos[self._qpos[:, None] + (0, 1)]
+        return self.data.qpos[self._index.qpos[:, None] + (0, 1)]
 
     def agent_heading(self) -> Array:
         """Direction the robots face.
@@ -150,7 +98,7 @@ class Physics(MujocoPhysics):
         Returns:
             Shape (n_agents, 2) [m/s].
         """
-        return self.data.qvel[self._qvel[:, None] + (0, 1)]
+        return self.data.qvel[self._index.qvel[:, None] + (0, 1)]
 
     def agent_yaw_rate(self) -> Array:
         """Angular velocity about the robots' own upward axis.
@@ -158,7 +106,7 @@ class Physics(MujocoPhysics):
         Returns:
             Shape (n_agents,) [rad/s].
         """
-        return self.data.qvel[self._qvel + 5]
+        return self.data.qvel[self._index.qvel + 5]
 
     def agent_tilt(self) -> Array:
         """Angle between the robots' upward axis and the vertical.
@@ -170,7 +118,7 @@ class Physics(MujocoPhysics):
         return np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
 
     def _agent_quaternion(self) -> Array:
-        return self.data.qpos[self._qpos[:, None] + (3, 4, 5, 6)]
+        return self.data.qpos[self._index.qpos[:, None] + (3, 4, 5, 6)]
 
     def set_twist(self, twist: Array) -> None:
         """Command the tendon actuators; MuJoCo clips to their ctrlrange.
@@ -178,7 +126,7 @@ class Physics(MujocoPhysics):
         Args:
             twist: (forward speed [m/s], yaw rate [rad/s]), shape (n_agents, 2).
         """
-        self.data.ctrl[self._ctrl] = twist
+        self.data.ctrl[self._index.ctrl] = twist
 
     def place_agent(self, slot: int, position: Array, heading: float) -> None:
         """Put a robot at rest on the floor and into contact with the world.
@@ -197,23 +145,19 @@ class Physics(MujocoPhysics):
             slot: Agent slot.
         """
         self._set_agent_state(slot, (2.0 * slot, 0.0, -_PARKING_DEPTH), 0.0, present=False)
-        self._touches = {
-            key: touch
-            for key, touch in self._touches.items()
-            if touch.agent != slot and (touch.kind != Partner.AGENT or touch.partner != slot)
-        }
+        self._touches.end_of_agent(slot)
 
     def _set_agent_state(self, slot: int, position: tuple[float, ...], heading: float, *, present: bool) -> None:
         model, data = self.model, self.data
-        address = self._qpos[slot]
-        data.qpos[model.jnt_qposadr[self._agent_joints[slot]]] = 0.0
+        address = self._index.qpos[slot]
+        data.qpos[model.jnt_qposadr[self._index.agent_joints[slot]]] = 0.0
         data.qpos[address : address + 3] = position
         data.qpos[address + 3 : address + 7] = quaternion_of_yaw(heading)
-        data.qvel[self._agent_dofs[slot]] = 0.0
-        data.qacc_warmstart[self._agent_dofs[slot]] = 0.0
-        data.ctrl[self._ctrl[slot]] = 0.0
-        model.body_gravcomp[self._agent_bodies[slot]] = 0.0 if present else 1.0
-        self._set_contacts(self._agent_geoms[slot], present)
+        data.qvel[self._index.agent_dofs[slot]] = 0.0
+        data.qacc_warmstart[self._index.agent_dofs[slot]] = 0.0
+        data.ctrl[self._index.ctrl[slot]] = 0.0
+        model.body_gravcomp[self._index.agent_bodies[slot]] = 0.0 if present else 1.0
+        self._set_contacts(self._index.agent_geoms[slot], present)
 
     # Pedestrians
 
@@ -258,10 +202,9 @@ class Physics(MujocoPhysics):
             enabled: Shape (k,).
         """
         for slot, present in zip(slots, enabled, strict=True):
-            self._set_contacts(self._pedestrian_geom[slot : slot + 1], bool(present))
+            self._set_contacts(self._index.pedestrian_geom[slot : slot + 1], bool(present))
             if not present:
-                owner = self.n_agents + int(slot)
-                self._touches = {key: touch for key, touch in self._touches.items() if key[1] != owner}
+                self._touches.end_of_pedestrian(int(slot))
 
     def _set_contacts(self, geoms: IntArray, enabled: bool) -> None:
         bits = self._bits[geoms] if enabled else np.zeros((len(geoms), 2), dtype=self._bits.dtype)
@@ -294,7 +237,8 @@ class Physics(MujocoPhysics):
                     mujoco.mj_step(model, data)
                     # The floor is geom 0, and MuJoCo names it first: all else is a touch of two bodies.
                     if np.count_nonzero(contact.geom1):
-                        self._note_touches(time, None if self._path_velocity is None else self._path_velocity[k])
+                        walking = None if self._path_velocity is None else self._path_velocity[k]
+                        self._touches.note(model, data, time=time, velocity_before=before, walking=walking)
                     # One step later an invalid number has spread to all robots and nobody can tell whose it was.
                     if np.count_nonzero(self._warnings) != kinds_of_warning:
                         break
@@ -319,9 +263,9 @@ class Physics(MujocoPhysics):
         """Name the robot whose state MuJoCo found invalid first, if that is what it warns of."""
         warning = mujoco.mjtWarning
         for kind, address in (
-            (warning.mjWARN_BADQPOS, self._qpos),
-            (warning.mjWARN_BADQVEL, self._qvel),
-            (warning.mjWARN_BADQACC, self._qvel),
+            (warning.mjWARN_BADQPOS, self._index.qpos),
+            (warning.mjWARN_BADQVEL, self._index.qvel),
+            (warning.mjWARN_BADQACC, self._index.qvel),
         ):
             if self._new_warnings[int(kind)]:
                 slot = int(np.searchsorted(address, self.data.warning.lastinfo[int(kind)], side="right")) - 1
@@ -336,55 +280,4 @@ class Physics(MujocoPhysics):
         Returns:
             In order of time.
         """
-        touches, self._new_touches = self._new_touches, []
-        return touches
-
-    def _note_touches(self, time: float, path_velocity: Array | None) -> None:
-        pairs = self._owner[self.data.contact.geom]
-        touching = np.flatnonzero(pairs.min(axis=1) >= 0)
-        timestep = self.model.opt.timestep
-        forces: dict[tuple[int, int], float] = {}
-        for i in touching:
-            key = (int(min(pairs[i])), int(max(pairs[i])))
-            mujoco.mj_contactForce(self.model.ptr, self.data.ptr, int(i), self._force)
-            forces[key] = forces.get(key, 0.0) + float(self._force[0])
-            touch = self._touches.get(key)
-            # Contacts are found at the beginning of a step; the gap is between the last end and this beginning.
-            if touch is None or time - touch.last_time - timestep >= self._rearm_time - 1e-9:
-                touch = self._begin_touch(key, int(i), time, flip=pairs[i, 0] != key[0], path_velocity=path_velocity)
-                self._touches[key] = touch
-                self._new_touches.append(touch)
-            touch.last_time = time
-        for key, force in forces.items():
-            touch = self._touches[key]
-            touch.impulse += force * timestep
-            touch.peak_force = max(touch.peak_force, force)
-
-    def _begin_touch(
-        self, key: tuple[int, int], contact: int, time: float, *, flip: bool, path_velocity: Array | None
-    ) -> Touch:
-        agent, other = key
-        normal = self.data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
-        length = float(np.linalg.norm(normal))
-        heading = self.agent_heading()
-        if other < self.n_agents:
-            kind, partner = Partner.AGENT, other
-            partner_heading = float(heading[partner])
-            partner_velocity = self._velocity_before[self._qvel[partner] : self._qvel[partner] + 2].copy()
-        else:
-            kind, partner = Partner.PEDESTRIAN, other - self.n_agents
-            partner_heading = float(yaw_of_quaternion(self._mocap_quat[partner]))
-            partner_velocity = np.zeros(2) if path_velocity is None else path_velocity[partner].copy()
-        return Touch(
-            agent=agent,
-            kind=kind,
-            partner=partner,
-            time=time,
-            last_time=time,
-            position=self.data.contact.pos[contact, :2].copy(),
-            normal=normal / length if length > 0.0 else np.array([1.0, 0.0]),
-            agent_heading=float(heading[agent]),
-            partner_heading=partner_heading,
-            agent_velocity=self._velocity_before[self._qvel[agent] : self._qvel[agent] + 2].copy(),
-            partner_velocity=partner_velocity,
-        )
+        return self._touches.take_new()

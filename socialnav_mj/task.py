@@ -1,6 +1,5 @@
 """What the scene means: who enters when, what an agent sees, what it gains, when its run ends."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,12 +8,15 @@ from dm_env import specs
 from numpy.typing import NDArray
 
 from socialnav_mj.cast import NOBODY, Cast, Replay, cast_recording
+from socialnav_mj.collision import Collision, collisions_of
 from socialnav_mj.config import Scenario
-from socialnav_mj.episode import IntArray, Outcome, Partner
+from socialnav_mj.entrance import AgentQueue, Ghosts, is_free
+from socialnav_mj.episode import IntArray, Outcome
 from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
 from socialnav_mj.observation import observe
-from socialnav_mj.physics import Physics, Touch
+from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording
+from socialnav_mj.sample import Sample
 
 PROGRESS_REWARD = 1.0
 """Reward per metre that an agent came nearer to its goal [1/m]."""
@@ -24,31 +26,6 @@ COLLISION_REWARD = -5.0
 """Reward for each new collision."""
 
 _UNDER_WAY = -1
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sample:
-    """Truth about every agent slot at one control step, before arrived agents leave."""
-
-    agent: IntArray
-    """(n_slots,) index of the agent that is there, -1 for nobody."""
-    position: Array
-    """(n_slots, 2) [m]."""
-    heading: Array
-    """(n_slots,) [rad]."""
-    velocity: Array
-    """(n_slots, 2) [m/s]."""
-    yaw_rate: Array
-    """(n_slots,) [rad/s]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Collision:
-    """A touch with the agents and the pedestrian behind the slots; indices into the task's cast."""
-
-    touch: Touch
-    agent: int
-    partner: int
 
 
 class CrowdTask(base.Task):
@@ -83,19 +60,11 @@ class CrowdTask(base.Task):
         self.end_step = np.full(n, -1, dtype=np.int64)
         self.collisions: list[Collision] = []
         self._slot_agent = np.full(slots, NOBODY, dtype=np.int64)
-        self._next_agent = 0
-        self._order = np.argsort(self.cast.agent_appear_step, kind="stable")
-        self._waiting: list[int] = []
-        self._ghosts: set[int] = set()
+        self._queue = AgentQueue(self.cast)
+        self._ghosts = Ghosts()
         self._goal_distance = np.zeros(slots)
         self._reward = np.zeros(slots)
-        self._sample = Sample(
-            agent=self._slot_agent.copy(),
-            position=np.zeros((slots, 2)),
-            heading=np.zeros(slots),
-            velocity=np.zeros((slots, 2)),
-            yaw_rate=np.zeros(slots),
-        )
+        self._sample = Sample.nobody(slots)
 
     @property
     def time(self) -> float:
@@ -148,7 +117,7 @@ class CrowdTask(base.Task):
         self._clear()
         self._update_pedestrians(physics)
         self._spawn(physics)
-        self._take_sample(physics)
+        self._sample = Sample.of(physics, self._slot_agent)
 
     def before_step(self, action: Array, physics: Physics) -> None:
         """Turn wheel speeds into tendon commands and set people in motion.
@@ -186,11 +155,13 @@ class CrowdTask(base.Task):
         self.step += 1
         self._reward = np.zeros(self.cast.n_agent_slots)
         struck = self._note_collisions(physics)
-        self._take_sample(physics)
+        self._sample = Sample.of(physics, self._slot_agent)
         self._end_runs(physics, struck)
         self._update_pedestrians(physics)
         if self._spawn(physics):
-            self._add_spawned(physics)
+            # No slot can hold a newly spawned agent and one who just left.
+            new = np.flatnonzero((self._slot_agent != NOBODY) & (self._sample.agent == NOBODY))
+            self._sample = self._sample.updated(Sample.of(physics, self._slot_agent), new)
         physics.refresh_poses()
 
     def get_observation(self, physics: Physics) -> dict[str, NDArray[Any]]:
@@ -258,86 +229,43 @@ class CrowdTask(base.Task):
         now = self._replay.crowd(self.step)
         if now.changed.size:
             physics.park_pedestrians(now.changed)
-            self._ghosts = self._ghosts - set(now.changed.tolist()) | (
-                set(now.changed.tolist()) & set(now.present.tolist())
-            )
         physics.set_pedestrian_pose(now.present, now.position[now.present], now.quaternion[now.present])
-        if not self._ghosts:
-            return
-        pending = np.array(sorted(self._ghosts), dtype=np.int64)
-        robots = physics.agent_position()[self._slot_agent != NOBODY]
-        gap = np.linalg.norm(now.position[pending][:, None] - robots, axis=-1)
-        clear = (gap > self.scenario.contact_distance).all(axis=1)
-        physics.set_pedestrian_contacts(pending[clear], np.ones(int(clear.sum()), dtype=bool))
-        self._ghosts = set(pending[~clear].tolist())
+        solid = self._ghosts.solidify(now, self._robots(physics), distance=self.scenario.contact_distance)
+        physics.set_pedestrian_contacts(solid, np.ones(len(solid), dtype=bool))
+
+    def _robots(self, physics: Physics) -> Array:
+        """Positions of the robots under way, shape (k, 2) [m]."""
+        return physics.agent_position()[self._slot_agent != NOBODY]
 
     # Agents
 
-    def _take_sample(self, physics: Physics) -> None:
-        self._sample = Sample(
-            agent=self._slot_agent.copy(),
-            position=physics.agent_position(),
-            heading=physics.agent_heading(),
-            velocity=physics.agent_velocity(),
-            yaw_rate=physics.agent_yaw_rate(),
-        )
-
-    def _add_spawned(self, physics: Physics) -> None:
-        """Let the sample hold the newly spawned beside those who just left; no slot can be both."""
-        new = (self._slot_agent != NOBODY) & (self._sample.agent == NOBODY)
-        self._sample.agent[new] = self._slot_agent[new]
-        self._sample.position[new] = physics.agent_position()[new]
-        self._sample.heading[new] = physics.agent_heading()[new]
-        self._sample.velocity[new] = 0.0
-        self._sample.yaw_rate[new] = 0.0
-
     def _spawn(self, physics: Physics) -> bool:
         """Let agents in whose person has appeared, in that order, where there is room; the others wait."""
-        while self._next_agent < len(self._order):
-            agent = int(self._order[self._next_agent])
-            if self.cast.agent_appear_step[agent] > self.step:
-                break
-            self._waiting.append(agent)
-            self._next_agent += 1
         # Slots that hold an agent in the sample are not free yet, even if its run has just ended.
         free = np.flatnonzero((self._slot_agent == NOBODY) & (self._sample.agent == NOBODY))
-        still_waiting = []
+        people = self._replay.crowd(self.step)
+        standing = people.position[people.present]
         n_free = len(free)
-        for agent in self._waiting:
-            if not len(free) or not self._is_free(physics, self.cast.agent_start[agent]):
-                still_waiting.append(agent)
+        for agent in self._queue.waiting(self.step):
+            start = self.cast.agent_start[agent]
+            if not len(free) or not is_free(
+                start, people=standing, robots=self._robots(physics), scenario=self.scenario
+            ):
                 continue
             slot, free = int(free[0]), free[1:]
-            physics.place_agent(slot, self.cast.agent_start[agent], float(self.cast.agent_heading[agent]))
+            physics.place_agent(slot, start, float(self.cast.agent_heading[agent]))
+            self._queue.let_in(agent)
             self._slot_agent[slot] = agent
             self.spawn_step[agent] = self.step
-            self._goal_distance[slot] = np.linalg.norm(self.cast.agent_goal[agent] - self.cast.agent_start[agent])
-        self._waiting = still_waiting
+            self._goal_distance[slot] = np.linalg.norm(self.cast.agent_goal[agent] - start)
         return len(free) < n_free
 
-    def _is_free(self, physics: Physics, place: Array) -> bool:
-        scenario, clearance = self.scenario, self.scenario.spawn_clearance
-        now = self._replay.crowd(self.step)
-        people = now.position[now.present]
-        robots = physics.agent_position()[self._slot_agent != NOBODY]
-        return bool(
-            (np.linalg.norm(people - place, axis=1) >= scenario.contact_distance + clearance).all()
-            and (np.linalg.norm(robots - place, axis=1) >= 2.0 * scenario.robot.radius + clearance).all()
-        )
-
     def _note_collisions(self, physics: Physics) -> list[int]:
-        """Translate new touches from slots to people; agents struck in this step, by slot."""
+        """Translate new touches from slots to people; slots of the agents struck in this step, once a touch."""
         present = self._replay.crowd(self.step - 1).pedestrian
-        struck: list[int] = []
-        for touch in physics.new_touches():
-            agent = int(self._slot_agent[touch.agent])
-            struck.append(touch.agent)
-            if touch.kind == Partner.AGENT:
-                struck.append(touch.partner)
-                partner = int(self._slot_agent[touch.partner])
-            else:
-                partner = int(present[touch.partner])
-            self.collisions.append(Collision(touch=touch, agent=agent, partner=partner))
+        new = collisions_of(physics.new_touches(), agent=self._slot_agent, pedestrian=present)
+        self.collisions += new
+        struck = [slot for collision in new for slot in collision.agent_slots]
         for slot in struck:
             self._reward[slot] += COLLISION_REWARD
         return struck

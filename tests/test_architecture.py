@@ -19,7 +19,7 @@ ROWS = (
     {"resources", "geometry", "config", "files", "processes"},
     {"recordings"},
     {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
-    {"cast", "scene", "physics", "task", "environment"},
+    {"cast", "scene", "scene_index", "touch", "physics", "sample", "collision", "entrance", "task", "environment"},
     {"tasks"},
     {"controllers"},
     {"recorder", "rollout", "human", "evaluation"},
@@ -40,7 +40,7 @@ EXCEPTIONS = {("socialnav_mj", "tasks")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
 # dm_control's Environment in their signatures, `benchmark` times bare mj_step calls, `cli` reports PhysicsError.
 ONLY_IN = {
-    "mujoco": {"scene", "physics", "task", "environment", "tasks", "benchmark"},
+    "mujoco": {"scene", "scene_index", "touch", "physics", "task", "environment", "tasks", "benchmark"},
     "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "benchmark", "cli", "socialnav_mj"},
     "matplotlib": {"report", "studies.paper"},
     "rerun": {"trace"},

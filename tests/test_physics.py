@@ -15,10 +15,11 @@ from socialnav_mj.config import Robot, Scenario
 from socialnav_mj.controllers import GoStraight, Limits
 from socialnav_mj.episode import Partner
 from socialnav_mj.geometry import Array, quaternion_of_yaw
-from socialnav_mj.physics import Physics, Touch
+from socialnav_mj.physics import Physics
 from socialnav_mj.resources import assets_folder
 from socialnav_mj.rollout import rollout
 from socialnav_mj.scene import build_model
+from socialnav_mj.touch import Touch
 
 TIMESTEP = 0.01  # [s]
 CONTACT_DISTANCE = 0.17 + 0.15  # [m]

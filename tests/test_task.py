@@ -1,6 +1,7 @@
 """What the scene means: spawn, delay, deadline, arrival, collisions, reward; and that equal runs are equal."""
 
 import os
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -393,3 +394,15 @@ def test_students003_is_replaced_by_the_shares_of_the_paper_without_those_who_st
         assert (moved >= 1.0).all()
         assert len(drawn) + task.cast.n_pedestrians == 434
         previous = drawn
+
+
+def test_sample_cannot_be_written_to() -> None:
+    environment = environment_of(*busy_crowd(), agents=[2, 3, 5, 7])
+    environment.reset()
+    for _ in range(20):  # agents have come in one after the other
+        environment.step(still(environment))
+    sample = environment.task.sample
+    assert (sample.agent >= 0).any()
+    for field in fields(sample):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(sample, field.name)[:] = 0

@@ -1,0 +1,89 @@
+"""Where the robots and people of a scene are in MuJoCo's arrays; names are looked up once, never in the step loop."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from socialnav_mj.episode import IntArray
+from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, agent_name, pedestrian_name
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneIndex:
+    """Addresses and ids, a row or an entry for every slot. n is the number of robots, m that of pedestrians."""
+
+    qpos: IntArray
+    """(n,) first address of each robot's free joint in `qpos`: 3 of position, 4 of the quaternion."""
+    qvel: IntArray
+    """(n,) the same in `qvel`: 3 of velocity, 3 of angular velocity."""
+    ctrl: IntArray
+    """(n, 2) actuators of forward speed and yaw rate."""
+    agent_bodies: tuple[IntArray, ...]
+    """Bodies of each robot."""
+    agent_geoms: tuple[IntArray, ...]
+    """Geoms of each robot."""
+    agent_dofs: tuple[IntArray, ...]
+    """Degrees of freedom of each robot."""
+    agent_joints: tuple[IntArray, ...]
+    """Joints of each robot, the free one included."""
+    pedestrian_geom: IntArray
+    """(m,) collider of each pedestrian; mocap bodies have the slots' order."""
+    owner: IntArray
+    """(ngeom,) whose collider a geom is: 0 to n - 1 for bumpers, n to n + m - 1 for people, -1 for all others."""
+
+    @property
+    def n_agents(self) -> int:
+        """Robots in the pool."""
+        return len(self.qpos)
+
+    @property
+    def n_pedestrians(self) -> int:
+        """Mocap bodies in the pool."""
+        return len(self.pedestrian_geom)
+
+
+def index_scene(model: mujoco.MjModel) -> SceneIndex:
+    """Look up the names of a scene.
+
+    Args:
+        model: Of `scene.build_model`.
+
+    Returns:
+        The index.
+
+    Raises:
+        ValueError: If the floor is not the first geom or the pedestrians are not the mocap bodies, in this order.
+    """
+    names = [model.body(i).name for i in range(model.nbody)]
+    agents = [agent_name(i) for i in range(_count(names, AGENT_PREFIX, "/robot"))]
+    people = [pedestrian_name(i) for i in range(_count(names, PEDESTRIAN_PREFIX, "/pedestrian"))]
+    mocap = model.body_mocapid[np.array([model.body(name + "pedestrian").id for name in people])]
+    if not np.array_equal(mocap, np.arange(model.nmocap)) or model.geom("floor").id != 0:
+        raise ValueError("the scene must have the floor as its first geom and the pedestrians as its mocap bodies")
+    root = np.asarray(model.body_rootid)
+    robots = [model.body(name + "robot").id for name in agents]
+
+    def belonging(body_of_each: IntArray) -> tuple[IntArray, ...]:
+        return tuple(np.flatnonzero(root[body_of_each] == body) for body in robots)
+
+    bumpers = np.array([model.geom(name + "bumper").id for name in agents])
+    bodies = np.array([model.geom(name + "body").id for name in people])
+    owner = np.full(model.ngeom, -1, dtype=np.int64)
+    owner[bumpers] = np.arange(len(agents))
+    owner[bodies] = len(agents) + np.arange(len(people))
+    return SceneIndex(
+        qpos=np.array([model.joint(name + "root").qposadr[0] for name in agents], dtype=np.int64),
+        qvel=np.array([model.joint(name + "root").dofadr[0] for name in agents], dtype=np.int64),
+        ctrl=np.array([[model.actuator(name + what).id for what in ("forward", "yaw")] for name in agents]),
+        agent_bodies=belonging(np.arange(model.nbody)),
+        agent_geoms=belonging(model.geom_bodyid),
+        agent_dofs=belonging(model.dof_bodyid),
+        agent_joints=belonging(model.jnt_bodyid),
+        pedestrian_geom=bodies,
+        owner=owner,
+    )
+
+
+def _count(names: list[str], prefix: str, suffix: str) -> int:
+    return sum(name.startswith(prefix) and name.endswith(suffix) for name in names)

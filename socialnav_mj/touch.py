@@ -1,0 +1,167 @@
+"""Touches of two bodies, followed from physics step to physics step."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from socialnav_mj.episode import Partner
+from socialnav_mj.geometry import Array, yaw_of_quaternion
+from socialnav_mj.scene_index import SceneIndex
+
+
+@dataclass(kw_only=True, slots=True)
+class Touch:
+    """A contact between an agent and another body, from its first to its last physics step."""
+
+    agent: int
+    """Slot of the agent; of two agents the lower."""
+    kind: Partner
+    """What it touched."""
+    partner: int
+    """Slot of the other agent or of the pedestrian."""
+    time: float
+    """First physics step [s]."""
+    last_time: float
+    """Last physics step that was seen so far [s]."""
+    position: Array
+    """(2,) at first touch [m]."""
+    normal: Array
+    """(2,) unit vector from the agent to its partner at first touch."""
+    agent_heading: float
+    """At first touch [rad]."""
+    partner_heading: float
+    """At first touch; a pedestrian's is that of the control step [rad]."""
+    agent_velocity: Array
+    """(2,) just before [m/s]."""
+    partner_velocity: Array
+    """(2,) just before; a pedestrian's is the recorded one, not the mocap body's, which the solver takes as 0 [m/s]."""
+    impulse: float = 0.0
+    """Integral of the normal force so far [N s]."""
+    peak_force: float = 0.0
+    """Largest normal force so far [N]."""
+
+
+class TouchLog:
+    """Which bodies touch, and what they felt; two that part for less than the re-arm time touch on.
+
+    Bodies are numbered as in `SceneIndex.owner`, and a pair is known by its two numbers, the lower first.
+    """
+
+    def __init__(self, index: SceneIndex, *, rearm_time: float) -> None:
+        """Begin without a touch.
+
+        Args:
+            index: Of the scene.
+            rearm_time: Two bodies must have been apart this long before their next touch is a new one [s].
+        """
+        self._index, self._rearm_time = index, rearm_time
+        self._wrench = np.zeros(6)
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget every touch, those included that nobody has asked for yet."""
+        self._open: dict[tuple[int, int], Touch] = {}
+        self._new: list[Touch] = []
+
+    def end_of_agent(self, slot: int) -> None:
+        """Let a robot's next touch be a new one, with whomever.
+
+        Args:
+            slot: Agent slot.
+        """
+        self._open = {pair: touch for pair, touch in self._open.items() if slot not in pair}
+
+    def end_of_pedestrian(self, slot: int) -> None:
+        """Let a person's next touch be a new one, with whomever.
+
+        Args:
+            slot: Pedestrian slot.
+        """
+        self._open = {pair: touch for pair, touch in self._open.items() if pair[1] != self._index.n_agents + slot}
+
+    def take_new(self) -> list[Touch]:
+        """Touches that began since the last call; they go on growing while the bodies touch.
+
+        Returns:
+            In order of time.
+        """
+        touches, self._new = self._new, []
+        return touches
+
+    def note(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        *,
+        time: float,
+        velocity_before: Array,
+        walking: Array | None,
+    ) -> None:
+        """Read the contacts of the physics step that was just made.
+
+        Args:
+            model: The scene.
+            data: After the step.
+            time: At the beginning of the step, which is where MuJoCo finds contacts [s].
+            velocity_before: `qvel` at that time.
+            walking: Recorded velocity of the people, shape (n_pedestrians, 2); None for standing ones [m/s].
+        """
+        pairs = self._index.owner[data.contact.geom]
+        timestep = model.opt.timestep
+        forces: dict[tuple[int, int], float] = {}
+        for i in np.flatnonzero(pairs.min(axis=1) >= 0):
+            pair = (int(min(pairs[i])), int(max(pairs[i])))
+            mujoco.mj_contactForce(model, data, int(i), self._wrench)
+            forces[pair] = forces.get(pair, 0.0) + float(self._wrench[0])
+            touch = self._open.get(pair)
+            # The gap is between the last step's end and this one's beginning.
+            if touch is None or time - touch.last_time - timestep >= self._rearm_time - 1e-9:
+                touch = self._begin(
+                    data, pair, int(i), time, flip=pairs[i, 0] != pair[0], before=velocity_before, walking=walking
+                )
+                self._open[pair] = touch
+                self._new.append(touch)
+            touch.last_time = time
+        for pair, force in forces.items():
+            touch = self._open[pair]
+            touch.impulse += force * timestep
+            touch.peak_force = max(touch.peak_force, force)
+
+    def _begin(
+        self,
+        data: mujoco.MjData,
+        pair: tuple[int, int],
+        contact: int,
+        time: float,
+        *,
+        flip: bool,
+        before: Array,
+        walking: Array | None,
+    ) -> Touch:
+        agent, other = pair
+        index = self._index
+        normal = data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
+        length = float(np.linalg.norm(normal))
+        heading = yaw_of_quaternion(data.qpos[index.qpos[:, None] + (3, 4, 5, 6)])
+        if other < index.n_agents:
+            kind, partner = Partner.AGENT, other
+            partner_heading = float(heading[partner])
+            partner_velocity = before[index.qvel[partner] : index.qvel[partner] + 2].copy()
+        else:
+            kind, partner = Partner.PEDESTRIAN, other - index.n_agents
+            partner_heading = float(yaw_of_quaternion(data.mocap_quat[partner]))
+            partner_velocity = np.zeros(2) if walking is None else walking[partner].copy()
+        return Touch(
+            agent=agent,
+            kind=kind,
+            partner=partner,
+            time=time,
+            last_time=time,
+            position=data.contact.pos[contact, :2].copy(),
+            normal=normal / length if length > 0.0 else np.array([1.0, 0.0]),
+            agent_heading=float(heading[agent]),
+            partner_heading=partner_heading,
+            agent_velocity=before[index.qvel[agent] : index.qvel[agent] + 2].copy(),
+            partner_velocity=partner_velocity,
+        )
