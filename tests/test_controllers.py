@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import socialnav_mj.controllers as controllers
 from socialnav_mj.config import Robot, Scenario
-from socialnav_mj.controllers import Controller, Limits, TwistController, controller_config, make_controller
+from socialnav_mj.controllers import Controller, Limits, TwistController, controller_config, make_controller, registry
 from socialnav_mj.controllers.check import check_controller
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.potential_field import (
@@ -312,12 +311,12 @@ def test_make_controller_takes_names_settings_and_paths():
 
 def test_make_controller_takes_entry_points_of_installed_packages(monkeypatch):
     entries = (
-        EntryPoint("offered", f"{__name__}:Outside", controllers.ENTRY_POINT_GROUP),
-        EntryPoint("broken", "no_such_package:Thing", controllers.ENTRY_POINT_GROUP),
+        EntryPoint("offered", f"{__name__}:Outside", registry.ENTRY_POINT_GROUP),
+        EntryPoint("broken", "no_such_package:Thing", registry.ENTRY_POINT_GROUP),
     )
-    monkeypatch.setattr(controllers, "entry_points", lambda group: entries)
+    monkeypatch.setattr(registry, "entry_points", lambda group: entries)
     assert isinstance(make_controller("offered"), Outside)
-    assert controllers.available()[-2:] == ("broken", "offered")
+    assert registry.available()[-2:] == ("broken", "offered")
     with pytest.raises(ValueError, match=r"'broken' cannot be imported from 'no_such_package:Thing'"):
         make_controller("broken")
 

@@ -1,5 +1,7 @@
 """The mixed policy: where it switches, whom it counts, what it remembers, what the episode says of it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,14 @@ from hypothesis import strategies as st
 from scenes import TINY, environment_of, stand, walk
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.controllers import Limits, make_controller
+from socialnav_mj.controllers import (
+    Limits,
+    TwistController,
+    controller_config,
+    controller_of,
+    make_controller,
+    spec_of,
+)
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid, nearest_distance
 from socialnav_mj.controllers.potential_field import PotentialField
@@ -42,7 +51,7 @@ def observation(pedestrians=((),), agents=None, person=None):
 
 
 def hybrid(**kwargs) -> Hybrid:
-    controller = Hybrid(**{"near": "potential_field", "far": "go_straight", **kwargs})
+    controller = Hybrid(**{"near": PotentialField(), "far": GoStraight(), **kwargs})
     controller.reset(LIMITS)
     return controller
 
@@ -195,11 +204,84 @@ def test_episode_with_the_policies_goes_through_a_file(tmp_path):
         ({"who": "people"}, "who = 'people' is not allowed; allowed: pedestrians, anyone"),
         ({"switch_distance": -1.0}, "switch_distance = -1.0 is not allowed"),
         ({"hysteresis": float("nan")}, "hysteresis = nan is not allowed"),
-        ({"near": "nobody"}, "unknown controller 'nobody'"),
-        ({"far": "builtins:dict"}, "controller 'builtins:dict'"),
+        ({"near": "go_straight"}, "near = 'go_straight' is no TwistController and cannot be mixed"),
+        ({"far": dict}, "far = <class 'dict'> is no TwistController"),
     ],
 )
 def test_settings_that_cannot_be_are_named(kwargs, message):
     with pytest.raises(ValueError) as caught:
         hybrid(**kwargs)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("hybrid(near='nobody')", "unknown controller 'nobody'"),
+        ("hybrid(far='builtins:dict')", "controller 'builtins:dict'"),
+        ("hybrid(near='potential_field(influence_distance=-1)')", "influence_distance = -1 is not allowed"),
+        ("hybrid(near=3)", "controller 3 cannot be read"),
+    ],
+)
+def test_parts_that_cannot_be_made_are_named(spec, message):
+    with pytest.raises(ValueError) as caught:
+        make_controller(spec)
+    assert message in str(caught.value)
+
+
+# As text
+
+
+@dataclass(kw_only=True)
+class Own(TwistController):
+    """A controller of somebody else, with a setting that has no default."""
+
+    knob: int
+    name: str = "own"
+
+    def twist(self, observation):
+        return np.zeros((len(observation["active"]), 2))
+
+
+POLICY = "replay_irl(policy='students003_continuous_seed0')"
+
+
+@pytest.mark.parametrize(
+    "near",
+    [
+        "replay_irl",
+        POLICY,
+        "potential_field(attraction_limit=None)",
+        "potential_field( attraction_limit = 1.0 )",  # a default that is given, and not as it would be written
+        "potential_field(attraction_limit=None, name='PF')",
+        f"{__name__}:Own(knob=3)",
+        f"hybrid(near={POLICY!r}, switch_distance=1.5)",
+    ],
+)
+def test_parts_travel_as_the_specs_that_made_them(near):
+    """What is stored of a mixed policy is what earlier episodes hold, and makes the same one again."""
+    controller = make_controller(f"hybrid(near={near!r}, who='anyone')")
+    config = controller_config(controller)
+    assert config["near"] == near and config["far"] == "potential_field" and config["who"] == "anyone"
+    again = controller_of(config, trusted=[f"{__name__}:Own"])
+    assert controller_config(again) == config
+    assert again.policies == controller.policies == (make_controller(near).name, "potential_field")
+    assert controller_config(again.near) == controller_config(make_controller(near))
+
+
+def test_name_that_lies_is_not_run(monkeypatch, tmp_path):
+    """What a part is called may come from a file; it is taken for a spec only where it says what the part is."""
+    ran = tmp_path / "ran"
+    (tmp_path / "hostile.py").write_text(f"import pathlib\npathlib.Path({str(ran)!r}).touch()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    lying = "hybrid(near='go_straight', name=\"hybrid(near='hostile:Hostile')\")"
+    controller = controller_of({"class": "socialnav_mj.controllers.hybrid:Hybrid", "near": lying})
+    assert spec_of(controller.near).startswith("hybrid(near='go_straight', ")
+    assert not ran.exists()
+
+
+def test_controllers_that_were_never_a_spec_get_one():
+    assert spec_of(Own(knob=1)) == f"{__name__}:Own(knob=1, name='own')"
+    assert spec_of(Own(knob=1, name=f"{__name__}:Own(knob=2)")).startswith(f"{__name__}:Own(knob=1, name=")
+    for controller in (PotentialField(repulsion_gain=3.0), PotentialField(name="PF"), GoStraight(), Own(knob=1)):
+        assert controller_config(make_controller(spec_of(controller))) == controller_config(controller)

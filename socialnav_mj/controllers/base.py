@@ -13,8 +13,9 @@ from socialnav_mj.geometry import Array, wheel_speed_of_twist
 
 Observation = Mapping[str, NDArray[Any]]
 
-NAMES_CONTROLLER = "names_controller"
-"""Key in the metadata of a dataclass field whose value names another controller, as `make_controller` takes it."""
+IS_CONTROLLER = "is_controller"
+"""Key in the metadata of a dataclass field that holds another controller; on the command line and in an episode it is
+written as `make_controller` takes it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,8 +91,9 @@ class Controller(Protocol):
 class TwistController(ABC):
     """Base of controllers that think in twists: limits and wheel mapping are done here.
 
-    Subclasses are frozen dataclasses in spirit: their fields are their configuration, plain JSON values that travel
-    in every episode. A controller that switches between policies sets `policies` and overrides `active_policy`.
+    Subclasses are frozen dataclasses in spirit: their fields are their configuration, plain JSON values or other
+    controllers (`IS_CONTROLLER`), and travel in every episode. A controller that switches between policies sets
+    `policies` and overrides `active_policy`.
     """
 
     name: str

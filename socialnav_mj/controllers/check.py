@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.controllers import controller_config
 from socialnav_mj.controllers.base import Controller, Limits, Observation
+from socialnav_mj.controllers.specs import controller_config
 from socialnav_mj.geometry import Array
 from socialnav_mj.observation import observe
 

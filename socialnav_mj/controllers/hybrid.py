@@ -6,7 +6,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.controllers.base import NAMES_CONTROLLER, Limits, Observation, TwistController
+from socialnav_mj.controllers.base import IS_CONTROLLER, Limits, Observation, TwistController
+from socialnav_mj.controllers.potential_field import PotentialField
+from socialnav_mj.controllers.replay_irl import ReplayIRL
 from socialnav_mj.geometry import Array
 
 Who = Literal["pedestrians", "anyone"]
@@ -40,10 +42,10 @@ class Hybrid(TwistController):
     that is the default. At exactly the switch distance `far` acts: the paper says "below".
     """
 
-    near: str = field(default="replay_irl", metadata={NAMES_CONTROLLER: True})
-    """Controller near people, as `make_controller` takes it."""
-    far: str = field(default="potential_field", metadata={NAMES_CONTROLLER: True})
-    """Controller elsewhere."""
+    near: TwistController = field(default_factory=ReplayIRL, metadata={IS_CONTROLLER: True})
+    """Acts near people."""
+    far: TwistController = field(default_factory=PotentialField, metadata={IS_CONTROLLER: True})
+    """Acts elsewhere."""
     switch_distance: float = 2.0
     """[m]"""
     who: Who = "pedestrians"
@@ -51,30 +53,23 @@ class Hybrid(TwistController):
     hysteresis: float = 0.0
     """Once `near` acts, it does so until everybody is at switch_distance + hysteresis or beyond [m]."""
     name: str = "hybrid"
-    _controllers: tuple[TwistController, TwistController] = field(init=False, repr=False)
     _acting: NDArray[np.int64] = field(init=False, repr=False)
     _person: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        from socialnav_mj.controllers import make_controller
-
         if self.who not in get_args(Who):
             raise ValueError(f"who = {self.who!r} is not allowed; allowed: {', '.join(get_args(Who))}")
         for name in ("switch_distance", "hysteresis"):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)!r} is not allowed; allowed: numbers >= 0")
-        parts = []
         for name in ("near", "far"):
-            controller = make_controller(getattr(self, name))
-            if not isinstance(controller, TwistController):
+            if not isinstance(getattr(self, name), TwistController):
                 raise ValueError(f"{name} = {getattr(self, name)!r} is no TwistController and cannot be mixed")
-            parts.append(controller)
-        self._controllers = (parts[0], parts[1])
 
     @property
     def policies(self) -> tuple[str, ...]:
         """Names of the two controllers, near first."""
-        return tuple(controller.name for controller in self._controllers)
+        return self.near.name, self.far.name
 
     @property
     def active_policy(self) -> NDArray[np.int64]:
@@ -89,7 +84,7 @@ class Hybrid(TwistController):
             seed: For controllers that draw random numbers.
         """
         super().reset(limits, seed=seed)
-        for controller in self._controllers:
+        for controller in (self.near, self.far):
             controller.reset(limits, seed=seed)
         self._acting = np.zeros(0, dtype=np.int64)
         self._person = np.zeros(0, dtype=np.int64)
@@ -110,5 +105,5 @@ class Hybrid(TwistController):
             limit += self.hysteresis * ((self._acting == 0) & (self._person == observation["person"]))
         self._acting = np.where(distance < limit, 0, 1)
         self._person = observation["person"].copy()
-        near, far = (controller.twist(observation) for controller in self._controllers)
+        near, far = (controller.twist(observation) for controller in (self.near, self.far))
         return np.where((self._acting == 0)[:, None], near, far)

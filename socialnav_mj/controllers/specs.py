@@ -1,0 +1,200 @@
+"""Controllers as text and as JSON values, and back: what travels in episodes, and what a file may have made."""
+
+import json
+from collections.abc import Callable, Collection
+from importlib.metadata import entry_points
+from typing import Any, get_type_hints
+
+from typeguard import TypeCheckError, check_type
+
+from socialnav_mj.controllers.base import Controller
+from socialnav_mj.controllers.hybrid import Hybrid
+from socialnav_mj.controllers.registry import (
+    BUILT_IN,
+    ENTRY_POINT_GROUP,
+    class_path,
+    factory_of,
+    load,
+    made,
+    parse,
+    parts_of,
+    settings_of,
+)
+from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, policy_of
+
+
+def with_policy_of(spec: str, dataset: str) -> str:
+    """Let a learned controller act with the policy that learned from the recording it is to be judged on.
+
+    Args:
+        spec: As `make_controller` takes it.
+        dataset: Name of the recording.
+
+    Returns:
+        The spec with the recording's shipped policy wherever "replay_irl" stands without one; unchanged if it names its
+        policies, learns nothing, or no shipped policy learned from this recording alone.
+
+    Raises:
+        ValueError: If the spec cannot be read.
+    """
+    policy = policy_of(dataset)
+    name, config = parse(spec)
+    found: dict[str, str] = {}
+    if name == "replay_irl" and "policy" not in config and policy != DEFAULT_POLICY:
+        found = {"policy": policy}
+    elif name == "hybrid":
+        parts = {part: config.get(part, controller_config(Hybrid())[part]) for part in parts_of(Hybrid)}
+        found = {part: own for part, old in parts.items() if (own := with_policy_of(old, dataset)) != old}
+    if not found:
+        return spec
+    return _text(name, config | found)
+
+
+def controller_config(controller: Controller) -> dict[str, Any]:
+    """Configuration of a controller as it travels in every episode.
+
+    Args:
+        controller: A dataclass, or anything.
+
+    Returns:
+        The fields of a dataclass, and the class; for others the class alone. JSON values, as they are read back;
+        controllers that it is made of by their specs.
+
+    Raises:
+        ValueError: If a field is no JSON value.
+    """
+    kind = type(controller)
+    result: dict[str, Any] = {"class": class_path(kind)}
+    for name in (field.name for field in settings_of(kind)):
+        value = getattr(controller, name)
+        try:
+            result[name] = spec_of(value) if name in parts_of(kind) else json.loads(json.dumps(value, allow_nan=False))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{result['class']}.{name} = {value!r} is not allowed; allowed: JSON values") from error
+    return result
+
+
+def spec_of(controller: Controller) -> str:
+    """Inverse of `make_controller`.
+
+    Args:
+        controller: A dataclass, or anything that is made without arguments.
+
+    Returns:
+        The controller's own name if that makes the same controller, else its class with the settings
+        that it takes.
+
+    Raises:
+        ValueError: If a setting is no JSON value.
+    """
+    kind = type(controller)
+    names = [name for name, factory in BUILT_IN.items() if factory is kind]
+    names += [entry.name for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.value == class_path(kind)]
+    names.append(class_path(kind))
+    wanted = controller_config(controller)
+    own_name = wanted.get("name")
+    if isinstance(own_name, str) and _is_made_by(own_name, names, wanted, kind):
+        return own_name
+    settings = {name: value for name, value in wanted.items() if name != "class"}
+    for name in settings.copy():
+        fewer = {key: value for key, value in settings.items() if key != name}
+        # With settings, a spec without a name would be the name.
+        if (name != "name" or not fewer) and _makes(kind, fewer, wanted):
+            settings = fewer
+    return _text(names[0], settings)
+
+
+def _is_made_by(spec: str, names: Collection[str], wanted: dict[str, Any], kind: Callable[..., Controller]) -> bool:
+    """Whether a spec, which may come from a file, makes a controller; settings that it does not have are not run."""
+    try:
+        name, config = parse(spec)
+    except ValueError:
+        return False
+    known = name in names and all(key in wanted and wanted[key] == value for key, value in config.items())
+    return known and _makes(kind, {**config, "name": spec}, wanted)
+
+
+def _makes(kind: Callable[..., Controller], settings: dict[str, Any], wanted: dict[str, Any]) -> bool:
+    try:
+        return controller_config(made(kind, settings)) == wanted
+    except (TypeError, ValueError):
+        return False
+
+
+def _text(name: str, settings: dict[str, Any]) -> str:
+    return f"{name}({', '.join(f'{key}={value!r}' for key, value in settings.items())})" if settings else name
+
+
+def controller_of(config: dict[str, Any], *, trusted: Collection[str] = ()) -> Controller:
+    """Inverse of `controller_config`, for configurations that come from a file.
+
+    Nothing that it names is imported or called unless it is built in, offered by an installed package, or trusted by
+    whoever asks.
+
+    Args:
+        config: As it travels in an episode.
+        trusted: Classes outside of those, as "package.module:Class".
+
+    Returns:
+        A new controller of the same class and configuration.
+
+    Raises:
+        ValueError: If the class is unknown and not trusted, is no controller, or does not take the configuration.
+    """
+    if not isinstance(config, dict) or not isinstance(config.get("class"), str):
+        raise ValueError(f'controller_config = {config!r} is not allowed; allowed: a JSON object with "class"')
+    values = dict(config)
+    path = values.pop("class")
+    kind = _known_class(path, trusted)
+    _check_values(path, kind, values, trusted)
+    try:
+        return made(kind, values)
+    except TypeError as error:
+        raise ValueError(f"controller {path!r} cannot be made with {values}: {error}") from error
+
+
+def _known_class(path: str, trusted: Collection[str]) -> Callable[..., Controller]:
+    offered = [*BUILT_IN.values(), *(load(entry.name, entry.value) for entry in entry_points(group=ENTRY_POINT_GROUP))]
+    for factory in offered:
+        if isinstance(factory, type) and class_path(factory) == path:
+            return factory
+    if path not in trusted:
+        raise ValueError(_untrusted(path))
+    kind = load(path, path)
+    lacking = [name for name in ("reset", "act") if not callable(getattr(kind, name, None))]
+    if not isinstance(kind, type) or lacking:
+        raise ValueError(f"{path!r} is no controller: expected a class with reset and act")
+    return kind
+
+
+def _check_values(path: str, kind: Callable[..., Controller], values: dict[str, Any], trusted: Collection[str]) -> None:
+    """Settings that a file gives are those that the class has, of their types, and name nothing untrusted either."""
+    allowed = {field.name: field for field in settings_of(kind)}
+    hints = get_type_hints(kind) if allowed else {}
+    for name, value in values.items():
+        if name not in allowed:
+            known = ", ".join(allowed) or "none"
+            raise ValueError(f"controller {path!r} has no setting {name!r}; allowed: {known}")
+        try:
+            check_type(value, str if name in parts_of(kind) else hints[name])
+        except TypeCheckError as error:
+            raise ValueError(f"controller {path!r}: {name} = {value!r} is not allowed: {error}") from error
+        if name in parts_of(kind):
+            _check_trusted_spec(value, trusted)
+
+
+def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
+    name, config = parse(spec)
+    if ":" in name and name not in trusted:
+        raise ValueError(_untrusted(name))
+    factory = factory_of(name)
+    for part in parts_of(factory):
+        if part in config:
+            _check_trusted_spec(config[part], trusted)
+
+
+def _untrusted(path: str) -> str:
+    return (
+        f"the file names the controller {path!r}, which is neither built in nor offered by an installed package; "
+        f"importing it runs its code. If you trust that code, add --trust {path}"
+    )
