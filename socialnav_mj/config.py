@@ -1,7 +1,7 @@
 """Frozen configuration: the robot's dimensions and the scenario's numbers."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from math import ceil, isfinite, pi
 from numbers import Integral, Real
 from typing import Any, Literal, get_args
@@ -133,6 +133,25 @@ class Scenario:
         allowed = self.deadline_base + self.deadline_per_metre * distance
         return max(1, ceil(allowed / self.control_timestep - 1e-9))
 
+    def changed(self, **changes: Any) -> "Scenario":
+        """The scenario with other settings.
+
+        Args:
+            **changes: Values of `SETTINGS`: fields of `Scenario`, and those of its robot as robot_NAME.
+
+        Returns:
+            A new scenario.
+
+        Raises:
+            ValueError: If a setting is unknown, or a value is not allowed.
+        """
+        if unknown := sorted(set(changes) - set(SETTINGS)):
+            raise ValueError(f"unknown settings {', '.join(unknown)}; available: {', '.join(SETTINGS)}")
+        of_robot = {name: value for name, value in changes.items() if name.startswith(_ROBOT)}
+        own = {name: value for name, value in changes.items() if name not in of_robot}
+        robot = replace(self.robot, **{name.removeprefix(_ROBOT): value for name, value in of_robot.items()})
+        return replace(self, robot=robot, **own)
+
     def as_dict(self) -> dict[str, Any]:
         """The resolved configuration as plain JSON values.
 
@@ -152,3 +171,11 @@ class Scenario:
             The scenario.
         """
         return cls(**{**values, "robot": Robot(**values["robot"])})
+
+
+_ROBOT = "robot_"
+SETTINGS = (
+    *(setting.name for setting in fields(Scenario) if setting.name != "robot"),
+    *(f"{_ROBOT}{setting.name}" for setting in fields(Robot)),
+)
+"""Names of everything that can be set of a scenario, here and on the command line."""

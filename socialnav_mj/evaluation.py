@@ -12,7 +12,7 @@ from typing import Any
 import tasks
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_config, make_controller
-from socialnav_mj.environment import make_scenario
+from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import EpisodeError, check_name, read_header
 from socialnav_mj.files import write_whole
 from socialnav_mj.human import HUMAN, human_episode
@@ -45,7 +45,7 @@ class Evaluation:
     seed: int = 0
     """Seed of the first draw; the others count up from it."""
     task_kwargs: dict[str, Any] = field(default_factory=dict)
-    """Further keyword arguments of `socialnav_mj.environment.make_environment`."""
+    """Settings that differ from the scenarios', see `Scenario.changed`."""
 
     def __post_init__(self) -> None:
         if unknown := [name for name in self.scenarios if name not in tasks.ALL_TASKS]:
@@ -80,14 +80,6 @@ class Job:
     def cost(self) -> float:
         """CPU time that it takes, about [s]: 2.5/4.2/7/9 s in scenarios 1 to 4, half a second for recorded people."""
         return 0.5 if self.controller == HUMAN else 1.7 + 8.0 * tasks.SHARES[self.scenario]
-
-    def task_kwargs(self) -> dict[str, Any]:
-        """Keyword arguments of `tasks.load`, apart from the recording.
-
-        Returns:
-            A new dictionary.
-        """
-        return {**self.evaluation.task_kwargs, "seed": self.draw}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,11 +206,11 @@ def _run(job: Job, folder: Path) -> Done:
     evaluation = job.evaluation
     try:
         recording = _recording(evaluation.dataset, evaluation.variant, evaluation.data_dir)
+        scenario = _scenario(evaluation, job.scenario, job.draw)
         if job.controller == HUMAN:
-            scenario = _scenario(evaluation, job.scenario, job.draw)
             episode = human_episode(recording, scenario, scenario_name=job.scenario)
         else:
-            environment = tasks.load(job.scenario, {**job.task_kwargs(), "dataset": recording})
+            environment = build_environment(recording, scenario)
             episode = rollout(environment, make_controller(job.controller), scenario_name=job.scenario)
         episode.save(folder / job.file_name)
     except Exception as error:  # noqa: BLE001  whatever it is, it is told and the other episodes go on
@@ -234,7 +226,7 @@ def _recording(dataset: str, variant: str | None, data_dir: str | None) -> Recor
 
 
 def _scenario(evaluation: Evaluation, name: str, draw: int) -> Scenario:
-    return make_scenario(**{"share": tasks.SHARES[name], **evaluation.task_kwargs, "seed": draw})
+    return Scenario().changed(**{"share": tasks.SHARES[name], **evaluation.task_kwargs, "seed": draw})
 
 
 def _controller_configurations(specs: tuple[str, ...]) -> dict[str, dict[str, Any]]:

@@ -13,6 +13,7 @@ from dm_control.rl import control
 # dm_control.utils.containers cannot be the first import of dm_control.
 from dm_control.utils import containers
 
+from socialnav_mj.config import SETTINGS
 from socialnav_mj.environment import make_environment
 
 DOMAIN = "socialnav"
@@ -70,7 +71,9 @@ def load(
     """
     if task_name not in SUITE:
         raise ValueError(f"unknown task {task_name!r}; available: {', '.join(ALL_TASKS)}")
-    allowed = [name for name in inspect.signature(make_environment).parameters if name != "environment_kwargs"]
+    own = inspect.signature(make_environment).parameters.values()
+    allowed = [parameter.name for parameter in own if parameter.kind is not parameter.VAR_KEYWORD]
+    allowed = [*SETTINGS, *(name for name in allowed if name != "environment_kwargs")]
     if unknown := sorted(set(task_kwargs or {}) - set(allowed)):
         raise ValueError(f"unknown task_kwargs {', '.join(unknown)}; available: {', '.join(allowed)}")
     environment = SUITE[task_name](**(task_kwargs or {}), environment_kwargs=environment_kwargs)

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from socialnav_mj.cli import main
+from socialnav_mj.config import SETTINGS
 from socialnav_mj.episode import read_header
 from socialnav_mj.recordings import catalogue as catalogue_module
 
@@ -25,6 +26,7 @@ QUICK = ("evaluate", "--dataset", TINY, "--scenarios", "1", "--draws", "1", "--j
 COMMAND = (sys.executable, "-c", "from socialnav_mj.cli import main; main()")
 SLOW = """
 import time
+from socialnav_mj.config import SETTINGS
 from socialnav_mj.controllers import GoStraight
 
 class Slow(GoStraight):
@@ -106,6 +108,7 @@ def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(c
 def test_settings_of_the_command_reach_the_episodes():
     options = ["--robot-radius", "0.18", "--pedestrian-radius", "0.2", "--turn-limit", "per_second"]
     options += ["--on-collision", "retire", "--control-timestep", "0.1", "--seed", "4", "--out", "o"]
+    options += ["--goal-radius", "0.3", "--robot-max-speed", "0.8"]
     main([*QUICK, *options, "--controllers", "potential_field(attraction_limit=None)"])
     name = "scenario_1.potential_field-attraction_limit=None-.draw_004.npz"
     metadata = read_header(Path("o/episodes") / name)["metadata"]
@@ -116,7 +119,19 @@ def test_settings_of_the_command_reach_the_episodes():
         "per_second",
     )
     assert (scenario["on_collision"], scenario["control_timestep"], scenario["seed"]) == ("retire", 0.1, 4)
+    assert (scenario["goal_radius"], scenario["robot"]["max_speed"]) == (0.3, 0.8)
     assert metadata["controller_config"]["attraction_limit"] is None
+
+
+def test_everything_that_can_be_set_is_an_option_that_says_what_it_is(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(SystemExit):
+        main(["evaluate", "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    for name in set(SETTINGS) - {"share"}:
+        assert f"--{name.replace('_', '-')} " in text
+    assert "An agent has arrived when its centre is this near its goal [m]" in text
+    assert "Distance between the wheels' contact points [m]" in text
 
 
 def test_failing_controller_is_told_once_and_the_others_are_kept(capsys):

@@ -34,6 +34,16 @@ def test_configuration_survives_json() -> None:
     assert type(scenario.seed) is int
 
 
+def test_changes_are_of_the_scenario_or_of_its_robot() -> None:
+    scenario = Scenario(share=0.7, robot=Robot(track=0.3))
+    changed = scenario.changed(goal_radius=0.3, robot_radius=0.2)
+    assert changed == Scenario(share=0.7, goal_radius=0.3, robot=Robot(track=0.3, radius=0.2))
+    assert scenario == Scenario(share=0.7, robot=Robot(track=0.3)) == scenario.changed()
+    for name in ("robot", "radius", "robot_colour", "goal"):
+        with pytest.raises(ValueError, match=rf"^unknown settings {name}; available: share, .*, robot_max_speed$"):
+            scenario.changed(**{name: 1.0})
+
+
 def test_configuration_cannot_be_changed() -> None:
     with pytest.raises(AttributeError):
         Scenario().share = 0.5  # type: ignore[misc]

@@ -13,8 +13,8 @@ from scenes import TINY  # noqa: E402
 from scipy.stats import norm  # noqa: E402
 from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
 
+from socialnav_mj.config import Scenario  # noqa: E402
 from socialnav_mj.controllers.replay_irl import load_policy  # noqa: E402
-from socialnav_mj.environment import make_scenario  # noqa: E402
 from socialnav_mj.features import feature_set  # noqa: E402
 from socialnav_mj.learning.config import TrainingConfig  # noqa: E402
 from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv  # noqa: E402
@@ -60,7 +60,7 @@ def model_of(config: TrainingConfig) -> ReplayIRL:
         seed=config.seed,
     )
     experts = demonstrate(
-        recording, features, make_scenario(share=1.0), minimum_displacement=2.0, contact_distance=0.25, clearance=0.0
+        recording, features, Scenario(share=1.0), minimum_displacement=2.0, contact_distance=0.25, clearance=0.0
     )
     torch.set_num_threads(1)
     return ReplayIRL(env, experts, features, config)

@@ -67,7 +67,7 @@ def test_variants_change_what_they_say_and_nothing_else(experiment):
     assert [(c.who, c.switch_distance) for c in anyone] == [("anyone", 2.0)] * 2
     printed = [make_controller(c) for c in runs["pf_as_printed"].evaluation.controllers]
     assert printed[0].attraction_limit is None
-    assert [make_controller(c.far).attraction_limit for c in printed[1:]] == [None, None]
+    assert [c.far.attraction_limit for c in printed[1:]] == [None, None]
     swept = [make_controller(c).switch_distance for c in runs["switch_sweep"].evaluation.controllers]
     assert swept == [d for d in SWEEP for _ in range(2)] and 2.0 not in SWEEP
 

@@ -15,6 +15,8 @@ from scenes import TINY, state_of, still
 
 import socialnav_mj
 import tasks
+from socialnav_mj.config import SETTINGS, Robot, Scenario
+from socialnav_mj.environment import make_environment
 from socialnav_mj.physics import Physics
 
 
@@ -214,10 +216,27 @@ def test_keywords_become_the_scenario() -> None:
         "turn_limit": "per_second",
         "on_collision": "retire",
         "control_timestep": 0.1,
+        "physics_timestep": 0.02,
+        "goal_radius": 0.4,
+        "deadline_base": 9.0,
+        "deadline_per_metre": 3.0,
+        "minimum_displacement": 1.5,
+        "spawn_clearance": 0.1,
+        "contact_rearm_time": 0.3,
     }
-    scenario = tasks.load("scenario_1", {"dataset": TINY, "robot_radius": 0.21, **given}).task.scenario
+    of_robot = {"robot_radius": 0.21, "robot_max_speed": 0.8}
+    scenario = tasks.load("scenario_1", {"dataset": TINY, **given, **of_robot}).task.scenario
     assert {key: getattr(scenario, key) for key in given} == given
-    assert scenario.robot.radius == 0.21
+    assert scenario.robot == Robot(radius=0.21, max_speed=0.8)
+    assert set(SETTINGS) == {*given, *of_robot, "robot_model", "robot_wheel_radius", "robot_track"}
+
+
+def test_scenario_can_be_given_whole_and_changed() -> None:
+    given = Scenario(share=0.7, goal_radius=0.3, robot=Robot(radius=0.2))
+    scenario = make_environment(given, dataset=TINY, seed=4, robot_max_speed=0.5).task.scenario
+    expected = Scenario(share=0.7, goal_radius=0.3, robot=Robot(radius=0.2, max_speed=0.5), seed=4)
+    assert scenario == expected
+    assert make_environment(dataset=TINY).task.scenario == Scenario()
 
 
 @pytest.mark.parametrize("seed", [3, np.int64(3)])
@@ -239,7 +258,11 @@ def test_integer_random_names_the_draw(seed: Any) -> None:
             {},
             r"^unknown task 'scenario_5'; available: scenario_1, scenario_2, scenario_3, scenario_4$",
         ),
-        ("scenario_1", {"shares": 1, "color": 2}, r"^unknown task_kwargs color, shares; available: share, dataset, "),
+        (
+            "scenario_1",
+            {"shares": 1, "color": 2},
+            r"^unknown task_kwargs color, shares; available: share, seed, .*, dataset",
+        ),
         ("scenario_1", {"environment_kwargs": {}}, r"^unknown task_kwargs environment_kwargs; available: "),
         ("scenario_1", {"dataset": TINY, "share": 2}, r"^share = 2 is not allowed; allowed: numbers in \(0, 1\]$"),
         ("scenario_1", {"dataset": TINY, "seed": 0.5}, r"^seed = 0.5 is not allowed; allowed: integers >= 0$"),

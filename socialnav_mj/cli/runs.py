@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +11,7 @@ from rich.table import Table
 
 from socialnav_mj.cli.arguments import Folder, Name, Scenarios
 from socialnav_mj.cli.console import console, counted_progress, errors, follow, say
-from socialnav_mj.config import OnCollision, Robot, Scenario, TurnLimit
+from socialnav_mj.cli.settings import Settings, changes
 
 if TYPE_CHECKING:
     from socialnav_mj.verification import Verdict
@@ -44,16 +44,8 @@ class Evaluate:
     """Processes; -1 for one a core."""
     out: Folder = None
     """Folder of the results; runs/DATASET by default."""
-    robot_radius: float = Robot.radius
-    """[m]"""
-    pedestrian_radius: float = Scenario.pedestrian_radius
-    """[m]"""
-    turn_limit: TurnLimit = Scenario.turn_limit
-    """Reading of the paper's pi/6: a turn per control step, or rad/s."""
-    on_collision: OnCollision = Scenario.on_collision
-    """What an agent does after a collision; its success is void either way."""
-    control_timestep: float = Scenario.control_timestep
-    """Time between two actions [s]."""
+    settings: Annotated[object, tyro.conf.arg(constructor=Settings)] = field(default_factory=Settings)
+    """Of every scenario that is run."""
 
     def run(self) -> None:
         """Evaluate, then report."""
@@ -61,7 +53,6 @@ class Evaluate:
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
         from socialnav_mj.report.writer import write_report
 
-        names = ("robot_radius", "pedestrian_radius", "turn_limit", "on_collision", "control_timestep")
         evaluation = Evaluation(
             dataset=self.dataset,
             variant=self.variant,
@@ -70,7 +61,7 @@ class Evaluate:
             controllers=tuple(with_policy_of(spec, self.dataset) for spec in self.controllers),
             draws=self.draws,
             seed=self.seed,
-            task_kwargs={name: getattr(self, name) for name in names},
+            task_kwargs=changes(self.settings),
         )
         out = self.out or Path("runs") / Path(self.dataset).resolve().stem
         episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)

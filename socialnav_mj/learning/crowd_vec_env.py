@@ -1,6 +1,7 @@
 """A crowd as a stable-baselines3 VecEnv: every slot of the scene is one environment."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,10 +9,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-import tasks
 from socialnav_mj.cast import NOBODY, cast_recording
+from socialnav_mj.config import Robot, Scenario
 from socialnav_mj.controllers import Limits, make_controller
-from socialnav_mj.environment import Environment, make_scenario
+from socialnav_mj.environment import Environment, build_environment
 from socialnav_mj.episode import Outcome
 from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG, FeatureSet, absorbing_state, running_state, view_of
 from socialnav_mj.geometry import Array, twist_of_wheel_speed
@@ -56,11 +57,9 @@ class CrowdVecEnv(VecEnv):
         """
         self._guide = make_controller(guide)
         self._recordings, self._shares, self._features = tuple(recordings), tuple(shares), features
-        self._task_kwargs: dict[str, Any] = {
-            "robot_radius": robot_radius,
-            "pedestrian_radius": pedestrian_radius,
-            "on_collision": "retire",
-        }
+        self._scenario = Scenario(
+            robot=Robot(radius=robot_radius), pedestrian_radius=pedestrian_radius, on_collision="retire"
+        )
         self._random = np.random.default_rng(seed)
         self._scenes = 0
         self._actions = np.zeros((n_slots, 2))
@@ -76,7 +75,7 @@ class CrowdVecEnv(VecEnv):
         self._scenes += 1
         for _ in range(_MOST_DRAWS):
             seed = int(self._random.integers(2**31))
-            scenario = make_scenario(share=share, seed=seed, **self._task_kwargs)
+            scenario = replace(self._scenario, share=share, seed=seed)
             if cast_recording(recording, scenario).n_agent_slots <= self.num_envs:
                 break
         else:
@@ -86,7 +85,7 @@ class CrowdVecEnv(VecEnv):
             )
         self._limits = Limits.of(scenario)
         self._guide.reset(self._limits, seed=seed)
-        return tasks.load("scenario_1", {**self._task_kwargs, "dataset": recording, "share": share, "seed": seed})
+        return build_environment(recording, scenario)
 
     def reset(self) -> NDArray[np.float32]:
         """Begin the scene.

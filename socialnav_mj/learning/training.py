@@ -13,10 +13,10 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-import tasks
 from socialnav_mj import metrics
+from socialnav_mj.config import Scenario
 from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
-from socialnav_mj.environment import make_scenario
+from socialnav_mj.environment import build_environment
 from socialnav_mj.features import feature_set
 from socialnav_mj.files import write_json, write_whole, written_whole
 from socialnav_mj.learning.config import TrainingConfig
@@ -84,7 +84,7 @@ def train(
             demonstrate(
                 recording,
                 features,
-                make_scenario(share=1.0),
+                Scenario(share=1.0),
                 minimum_displacement=config.expert_displacement,
                 contact_distance=config.expert_contact_distance,
                 clearance=config.expert_clearance,
@@ -156,7 +156,7 @@ def validate(
     intrusions = steps = 0.0
     for recording in recordings:
         for draw, share in enumerate(shares):
-            environment = tasks.load("scenario_1", {"dataset": window(recording, *part), "share": share, "seed": draw})
+            environment = build_environment(window(recording, *part), Scenario(share=share, seed=draw))
             values = metrics.per_agent(rollout(environment, Policy(policy=str(policy_path))))
             success += values["success"].astype(float).tolist()
             time += values["time_under_way"].tolist()
