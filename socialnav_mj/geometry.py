@@ -18,19 +18,6 @@ def wrap_angle(angle: ArrayLike) -> Array:
     return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
 
 
-def unit_vector(heading: ArrayLike) -> Array:
-    """Unit vectors that point along headings.
-
-    Args:
-        heading: Angles from the x axis, shape (...) [rad].
-
-    Returns:
-        Shape (..., 2).
-    """
-    heading = np.asarray(heading, dtype=float)
-    return np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-
-
 def to_agent_frame(vector: ArrayLike, heading: ArrayLike) -> Array:
     """Rotate world vectors into a frame whose x axis is the agent's heading.
 

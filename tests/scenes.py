@@ -50,6 +50,19 @@ def stand(place: ArrayLike, begin: float, end: float) -> Walk:
     return Walk(np.array([begin, end]), np.tile(np.asarray(place, dtype=float), (2, 1)))
 
 
+def unit_vector(heading: ArrayLike) -> Array:
+    """Unit vectors that point along headings.
+
+    Args:
+        heading: Angles from the x axis, shape (...) [rad].
+
+    Returns:
+        Shape (..., 2).
+    """
+    heading = np.asarray(heading, dtype=float)
+    return np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+
+
 def recording_of(*walks: Walk) -> Recording:
     """A recording of people 1, 2, ..."""
     return Recording(

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from scenes import unit_vector
 
 from socialnav_mj.geometry import (
     quaternion_of_yaw,
     to_agent_frame,
     twist_of_wheel_speed,
-    unit_vector,
     wheel_speed_of_twist,
     wrap_angle,
     yaw_of_quaternion,

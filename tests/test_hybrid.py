@@ -1,4 +1,4 @@
-"""The mixed policy: where it switches, whom it counts, what it remembers, what the episode says of it."""
+"""The mixed policy: where it switches, whom it counts, what the episode says of it."""
 
 from dataclasses import dataclass
 
@@ -28,14 +28,13 @@ LIMITS = Limits.of(Scenario())
 NEAR, FAR = 0, 1
 
 
-def observation(pedestrians=((),), agents=None, person=None):
+def observation(pedestrians=((),), agents=None):
     """Agents that each see pedestrians, and other agents, straight ahead at some distances [m]; goals 5 m ahead."""
     n = len(pedestrians)
     agents = agents or [()] * n
-    person = np.arange(10, 10 + n) if person is None else np.asarray(person)
     result = {
-        "active": person >= 0,
-        "person": person,
+        "active": np.ones(n, dtype=bool),
+        "person": np.arange(10, 10 + n),
         "twist": np.zeros((n, 2)),
         "goal": np.tile([5.0, 1.0], (n, 1)),
     }
@@ -124,46 +123,16 @@ def test_masked_entries_do_not_count():
     assert nearest_distance(seen, who="anyone").tolist() == [np.inf]
 
 
-# Hysteresis
-
-
-def test_hysteresis_holds_the_near_policy_up_to_its_distance():
-    """Begin at 2.0 m, hold up to 2.5 m: the way in and out again."""
-    controller = hybrid(hysteresis=0.5)
-    way = [3.0, 2.4, 2.0, 1.99, 2.3, 2.499, 2.5, 2.4, 1.0, 9.0, 2.2]
-    expected = [FAR, FAR, FAR, NEAR, NEAR, NEAR, FAR, FAR, NEAR, FAR, FAR]
-    assert [acting(controller, [[d]])[0] for d in way] == expected
-
-
-def test_without_hysteresis_nothing_is_remembered():
+def test_nothing_is_remembered():
     controller = hybrid()
     assert [acting(controller, [[d]])[0] for d in (1.9, 2.1, 1.9, 2.1)] == [NEAR, FAR, NEAR, FAR]
 
 
-def test_slot_that_is_used_again_remembers_nothing():
-    """The same slot, at once with another person, and after a step without an agent."""
-    controller = hybrid(hysteresis=0.5)
-    assert acting(controller, [[1.0], [1.0]], person=[10, 11]) == [NEAR, NEAR]
-    assert acting(controller, [[2.3], [2.3]], person=[10, 12]) == [NEAR, FAR]
-    assert acting(controller, [[], [1.0]], person=[-1, 12]) == [FAR, NEAR]
-    assert acting(controller, [[2.3], [2.3]], person=[13, 12]) == [FAR, NEAR]
-
-
-def test_reset_forgets():
-    controller = hybrid(hysteresis=0.5)
-    assert acting(controller, [[1.0]]) == [NEAR]
-    controller.reset(LIMITS)
-    assert acting(controller, [[2.3]]) == [FAR]
-
-
-def test_remembered_state_is_the_controllers_own():
-    """Neither a changed observation nor a changed answer reaches into it."""
-    controller = hybrid(hysteresis=0.5)
-    seen = observation([[1.0]])
-    controller.act(seen)
-    seen["person"][:] = 99
+def test_answer_is_the_callers_to_change():
+    controller = hybrid()
+    controller.act(observation([[1.0]]))
     controller.active_policy[:] = FAR
-    assert acting(controller, [[2.3]]) == [NEAR]
+    assert controller.active_policy.tolist() == [NEAR]
 
 
 # In an episode
@@ -203,7 +172,7 @@ def test_episode_with_the_policies_goes_through_a_file(tmp_path):
     [
         ({"who": "people"}, "who = 'people' is not allowed; allowed: pedestrians, anyone"),
         ({"switch_distance": -1.0}, "switch_distance = -1.0 is not allowed"),
-        ({"hysteresis": float("nan")}, "hysteresis = nan is not allowed"),
+        ({"switch_distance": float("nan")}, "switch_distance = nan is not allowed"),
         ({"near": "go_straight"}, "near = 'go_straight' is no TwistController and cannot be mixed"),
         ({"far": dict}, "far = <class 'dict'> is no TwistController"),
     ],

@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import busy_crowd, environment_of
+from scenes import busy_crowd, environment_of, unit_vector
 
 from socialnav_mj.controllers import GoStraight, Limits
-from socialnav_mj.geometry import unit_vector
 from socialnav_mj.observation import observe
 
 WORLD = ("position", "heading")

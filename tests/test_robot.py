@@ -7,9 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scenes import unit_vector
 
 from socialnav_mj.config import Robot, Scenario
-from socialnav_mj.geometry import quaternion_of_yaw, unit_vector, wrap_angle, yaw_of_quaternion
+from socialnav_mj.geometry import quaternion_of_yaw, wrap_angle, yaw_of_quaternion
 from socialnav_mj.resources import assets_folder
 
 Array = NDArray[np.float64]

@@ -50,18 +50,14 @@ class Hybrid(TwistController):
     """[m]"""
     who: Who = "pedestrians"
     """Whose distance counts: replayed pedestrians, or "anyone"."""
-    hysteresis: float = 0.0
-    """Once `near` acts, it does so until everybody is at switch_distance + hysteresis or beyond [m]."""
     name: str = "hybrid"
     _acting: NDArray[np.int64] = field(init=False, repr=False)
-    _person: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.who not in get_args(Who):
             raise ValueError(f"who = {self.who!r} is not allowed; allowed: {', '.join(get_args(Who))}")
-        for name in ("switch_distance", "hysteresis"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name} = {getattr(self, name)!r} is not allowed; allowed: numbers >= 0")
+        if not self.switch_distance >= 0.0:
+            raise ValueError(f"switch_distance = {self.switch_distance!r} is not allowed; allowed: numbers >= 0")
         for name in ("near", "far"):
             if not isinstance(getattr(self, name), TwistController):
                 raise ValueError(f"{name} = {getattr(self, name)!r} is no TwistController and cannot be mixed")
@@ -87,7 +83,6 @@ class Hybrid(TwistController):
         for controller in (self.near, self.far):
             controller.reset(limits, seed=seed)
         self._acting = np.zeros(0, dtype=np.int64)
-        self._person = np.zeros(0, dtype=np.int64)
 
     def twist(self, observation: Observation) -> Array:
         """Twist of whichever controller is in charge of each agent.
@@ -98,12 +93,6 @@ class Hybrid(TwistController):
         Returns:
             Shape (n_agents, 2) [m/s], [rad/s].
         """
-        distance = nearest_distance(observation, who=self.who)
-        limit = np.full(len(distance), self.switch_distance)
-        if self.hysteresis and len(self._acting) == len(distance):
-            # A slot that holds another person than before starts anew.
-            limit += self.hysteresis * ((self._acting == 0) & (self._person == observation["person"]))
-        self._acting = np.where(distance < limit, 0, 1)
-        self._person = observation["person"].copy()
+        self._acting = np.where(nearest_distance(observation, who=self.who) < self.switch_distance, 0, 1)
         near, far = (controller.twist(observation) for controller in (self.near, self.far))
         return np.where((self._acting == 0)[:, None], near, far)

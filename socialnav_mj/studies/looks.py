@@ -1,6 +1,5 @@
 """How methods and scenarios look and are named in the figures and pages of all studies."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -51,15 +50,3 @@ def short_title(scenario: str, place: int) -> str:
         As "(a) scenario 1: 10 %", the share being that of agents.
     """
     return f"({'abcdefgh'[place]}) {SCENARIO_TITLES.get(scenario, scenario).removesuffix(' agents')}"
-
-
-def methods_of(found: Sequence[str]) -> list[str]:
-    """Methods in the order of every legend.
-
-    Args:
-        found: Those that there are.
-
-    Returns:
-        The same, sorted.
-    """
-    return [method for method in LOOKS if method in found]
