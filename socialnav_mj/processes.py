@@ -1,14 +1,62 @@
-"""Work in several processes that leave Ctrl-C to the command that started them."""
+"""Work in several processes that leave signals to the command that started them, and end with it."""
 
+import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import TypeVar
 
 from joblib import Parallel, delayed
 
 Result = TypeVar("Result")
+
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that ask a command to stop: Ctrl-C, a batch system or a shutdown, a closed terminal."""
+WATCH_PERIOD = 0.2
+"""Time between two looks of a worker at whether its parent lives [s]."""
+
+
+class Interruption(KeyboardInterrupt):
+    """A signal other than Ctrl-C's asked to stop; whatever lets a KeyboardInterrupt through lets this through."""
+
+    def __init__(self, number: int) -> None:
+        """Keep the signal.
+
+        Args:
+            number: Of the signal.
+        """
+        super().__init__(number)
+        self.number = number
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP stop the block as Ctrl-C does, with an `Interruption`.
+
+    A signal that this process was told to ignore, as `nohup` does with SIGHUP, stays ignored. Signals can be handled in
+    the main thread alone; elsewhere the block runs as it is.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    own = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) == signal.SIG_DFL]
+
+    def stop(number: int, _: FrameType | None) -> None:
+        # A shutdown sends both, one after the other: the second must not break the clean end that the first began.
+        for each in own:
+            signal.signal(each, signal.SIG_IGN)
+        raise Interruption(number)
+
+    for number in own:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in own:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def in_processes(
@@ -22,24 +70,39 @@ def in_processes(
         n_jobs: Processes; 1 for none but this one, -1 for one a core.
 
     Returns:
-        Results as they come, in no order. An exception of a call is raised here.
+        Results as they come, in no order. An exception of a call is raised here. The processes end within a second of
+        this one, however it ends.
     """
-    with _deaf_to_interrupts():
-        # Processes start here and inherit it: Ctrl-C is this process's to handle, which then ends them.
-        results: Iterator[Result] = Parallel(n_jobs=n_jobs, return_as="generator_unordered")(
-            delayed(function)(*own) for own in arguments
-        )
+    with _held_back(STOPPING):
+        # Processes start here and inherit it: signals are this process's to handle, which then ends them.
+        results: Iterator[Result] = Parallel(
+            n_jobs=n_jobs, return_as="generator_unordered", initializer=_serve, initargs=(os.getpid(),)
+        )(delayed(function)(*own) for own in arguments)
     return results
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Ignore Ctrl-C for a moment; signals can be set in the main thread alone."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _held_back(signals: Iterable[signal.Signals]) -> Iterator[None]:
+    """Hold signals back for a moment: they come when the block has ended; processes started in it never get them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(parent: int) -> None:
+    """Begin a worker's life: deaf to what its parent handles, and not longer than its parent's."""
+    for number in STOPPING:
+        signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process soon after its parent; a parent that is gone already has left it to another one.
+
+    Not prctl's PR_SET_PDEATHSIG, which also fires when the thread that started the worker ends.
+    """
+    while os.getppid() == parent:
+        time.sleep(WATCH_PERIOD)
+    os._exit(1)

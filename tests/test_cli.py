@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -181,8 +182,29 @@ def test_path_in_a_message_is_not_broken_by_the_terminals_width(tmp_path, capsys
     assert f"{folder}/episodes" in capsys.readouterr().err
 
 
-def interrupted(folder, jobs):
-    """Start a run whose second controller is slow, press Ctrl-C when the first is done; exit code and errors."""
+def alive(group):
+    """Processes of a group that still run; a test's init may leave the dead ones unburied."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # gone meanwhile
+            state, _, pgrp = path.read_text().rpartition(")")[2].split()[:3]
+            if int(pgrp) == group and state not in "ZX":
+                found.append(int(path.parent.name))
+    return found
+
+
+def interrupted(folder, jobs, number=signal.SIGINT, *, all_of_them=True):
+    """Start a run whose second controller is slow, and send it a signal when the first is done.
+
+    Args:
+        folder: Of the run.
+        jobs: Processes.
+        number: The signal; SIGINT is Ctrl-C.
+        all_of_them: Send it to the workers as well, as a terminal does.
+
+    Returns:
+        Exit code and errors, when no process of the run is left.
+    """
     Path("slow.py").write_text(SLOW)
     args = ("evaluate", "--dataset", TINY, "--scenarios", "1", "--draws", "2", "--out", folder, "--jobs", jobs)
     process = subprocess.Popen(
@@ -195,26 +217,51 @@ def interrupted(folder, jobs):
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     episodes = Path(folder) / "episodes"
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 300.0
     while len(list(episodes.glob("[!.]*.npz"))) < 2 and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the command and to its processes
-    output, errors = process.communicate(timeout=60)
-    assert output == ""
+    (os.killpg if all_of_them else os.kill)(process.pid, number)
+    output, errors = process.communicate(timeout=300)
+    # A slow episode takes 15 s, and each worker has one of its own.
+    deadline = time.monotonic() + 5.0
+    while alive(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    left = alive(process.pid)
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    assert output == "" and not left
     return process.returncode, errors
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_ctrl_c_leaves_finished_episodes_and_the_next_run_goes_on(jobs, capsys):
-    code, errors = interrupted("o", jobs)
-    assert code == 130, errors
+@pytest.mark.parametrize(
+    ("jobs", "number", "all_of_them"),
+    [
+        ("1", signal.SIGINT, True),
+        ("2", signal.SIGINT, True),
+        ("1", signal.SIGTERM, False),
+        ("2", signal.SIGTERM, False),
+        ("2", signal.SIGTERM, True),
+        ("2", signal.SIGHUP, True),
+    ],
+)
+def test_signal_leaves_finished_episodes_and_no_process_and_the_next_run_goes_on(jobs, number, all_of_them, capsys):
+    code, errors = interrupted("o", jobs, number, all_of_them=all_of_them)
+    assert code == 128 + number, errors
     assert "interrupted; the same command goes on where it was" in errors and "Traceback" not in errors
-    kept = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").glob("[!.]*.npz")}
+    kept = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()}
     assert set(kept) == {"scenario_1.go_straight.draw_000.npz", "scenario_1.go_straight.draw_001.npz"}
     main([*QUICK, "--draws", "2", "--out", "o", "--controllers", "go_straight"])
     after = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").glob("[!.]*.npz")}
     assert len(after) == 4 and {name: after[name] for name in kept} == kept
     assert "4/4" in capsys.readouterr().err
+
+
+def test_killed_command_leaves_no_process_and_no_file_changes_any_more():
+    code, _ = interrupted("o", "2", signal.SIGKILL, all_of_them=False)
+    assert code == -signal.SIGKILL
+    left = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()}
+    time.sleep(1.0)
+    assert {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()} == left
 
 
 # list, data, bench

@@ -1,5 +1,6 @@
 """The command `socialnav-mj`: sub-commands, and nothing that another module could do."""
 
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +13,7 @@ from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
 from socialnav_mj.cli.studies import LeaveOneOut, Reproduce, Ship, Train
+from socialnav_mj.processes import stoppable
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
@@ -29,7 +31,9 @@ Command = (
 
 
 def main(args: list[str] | None = None) -> None:
-    """Entry point; bad input ends in one clear message and exit code 2, an interruption in 130.
+    """Entry point; bad input ends in one clear message and exit code 2, an interruption in 128 + the signal's number.
+
+    These are 130 for Ctrl-C, 143 for SIGTERM and 129 for SIGHUP.
 
     Args:
         args: Command line without the program's name; sys.argv by default.
@@ -44,10 +48,11 @@ def main(args: list[str] | None = None) -> None:
     # As `python -m` does, so that package.module:Class finds what lies here; last, so that it hides nothing.
     sys.path.append(str(Path.cwd()))
     try:
-        command.run()
-    except KeyboardInterrupt:
+        with stoppable():
+            command.run()
+    except KeyboardInterrupt as stop:
         say("interrupted; the same command goes on where it was", errors)
-        sys.exit(130)
+        sys.exit(128 + getattr(stop, "number", signal.SIGINT))
     except (ValueError, OSError, RuntimeError, PhysicsError) as error:
         say(f"error: {error}", errors, style="red")
         sys.exit(2)
