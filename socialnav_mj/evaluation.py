@@ -14,7 +14,7 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_config, make_controller
 from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import EpisodeError, check_name, read_header
-from socialnav_mj.files import write_whole
+from socialnav_mj.files import clear_leftovers, write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import recording_metadata
@@ -178,6 +178,7 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
         _scenario(evaluation, scenario, evaluation.seed)
     configurations = _controller_configurations(evaluation.controllers)
     _check_folder(folder / "episodes", jobs, recording, configurations)
+    clear_leftovers(folder / "episodes")
     # Episodes of earlier commands belong to the run as well: they are in its tables.
     episodes = sorted({job.file_name for job in jobs} | {path.name for path in (folder / "episodes").glob("[!.]*.npz")})
     run = {"command": command, "controllers": [*configurations], "episodes": episodes}

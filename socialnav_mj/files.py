@@ -1,33 +1,96 @@
 """Files that appear whole or not at all."""
 
+import fcntl
 import json
 import os
+import re
+import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+_PART = re.compile(r"\..+\.(\d+)\.part(\.[^.]*)?")
 
 
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[Path]:
     """A temporary path beside the target that replaces it when the block ends, and vanishes if the block fails.
 
+    The first file that a process writes into a folder clears it of what dead writers left.
+
     Args:
         path: Target; its folders are made.
 
     Yields:
-        Path to write to, with the target's suffix.
+        Path to write to, with the target's suffix; there is an empty file.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    _clear_once(path.parent.resolve(), os.getpid())
     part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
-        yield part
+        with part.open("wb") as file:
+            # Others see by the lock that this file is being written, also those on another machine or in a container.
+            with suppress(OSError):  # a file system without locks: the process's number has to do
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield part
         with part.open("rb") as file:
             os.fsync(file.fileno())
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def clear_leftovers(folder: str | Path) -> None:
+    """Remove the temporary files of `written_whole` that dead processes left in a folder.
+
+    A file stays whose process lives, unless that began after the file was last written: its number was given anew. A
+    file stays that somebody holds the lock of: its writer is on another machine, or in another container.
+
+    Args:
+        folder: Its own files alone are looked at; it need not be there.
+    """
+    for part in Path(folder).glob(".*.part*"):
+        name = _PART.fullmatch(part.name)
+        try:
+            if name and not _is_written(part, int(name[1])):
+                part.unlink()
+        except FileNotFoundError:
+            continue  # its writer was quicker, or another one who clears up
+
+
+@lru_cache(maxsize=1024)
+def _clear_once(folder: Path, _process: int) -> None:
+    clear_leftovers(folder)
+
+
+def _is_written(part: Path, process: int) -> bool:
+    """Whether somebody may still be writing a temporary file."""
+    if part.stat().st_mtime > _began(process):
+        return True
+    with part.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+    return False
+
+
+def _began(process: int) -> float:
+    """When a process began [s since the epoch]; infinity if none of this number lives."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return float("inf")
+    if fields[0] in "ZX":
+        return float("inf")
+    # proc(5): field 22, where these begin with field 3, in clock ticks since the machine started.
+    since_start = int(fields[19]) / os.sysconf("SC_CLK_TCK")
+    return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + since_start
 
 
 def write_whole(path: str | Path, content: bytes) -> Path:

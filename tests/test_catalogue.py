@@ -4,7 +4,10 @@ import dataclasses
 import hashlib
 import http.server
 import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -133,6 +136,25 @@ def test_fetch_downloads_reports_progress_and_keeps_what_is_right(server: str, t
     calls.clear()
     assert fetch_row(row, tmp_path, progress=lambda *call: calls.append(call)) == paths
     assert not calls
+
+
+def test_fetch_is_killed_and_the_next_one_clears_up(server: str, tmp_path: Path) -> None:
+    """Killed between the download and its check; what is left is known as what it is."""
+    begun = """
+import os, signal, sys
+from pathlib import Path
+from socialnav_mj.recordings import fetch
+from test_catalogue import row_of
+fetch.hash_matches = lambda *args, **kwargs: os.kill(os.getpid(), signal.SIGKILL)
+fetch.fetch_row(row_of(sys.argv[1]), Path(sys.argv[2]))
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path])}
+    done = subprocess.run([sys.executable, "-c", begun, server, str(tmp_path)], env=environment, check=False)
+    assert done.returncode == -signal.SIGKILL
+    (left,) = files_below(tmp_path)
+    assert left.read_bytes() == CONTENT and left.name != "a.txt"
+    (path,) = fetch_row(row_of(server), tmp_path)
+    assert files_below(tmp_path) == [path]
 
 
 def test_fetch_replaces_a_damaged_file(server: str, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Grids of episodes: resumable, the same with any number of processes, and clear about what does not fit."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -95,10 +96,13 @@ def test_interrupted_run_goes_on_where_it_was(finished, tmp_path):
             break
     before = episodes(tmp_path)
     assert 5 <= len(before) < 12
-    (tmp_path / "episodes" / ".scenario_1.human.draw_000.1.part.npz").write_bytes(b"left by a killed process")
+    left = tmp_path / "episodes" / f".scenario_1.human.draw_000.{os.getpid()}.part.npz"
+    left.write_bytes(b"left by a killed process whose number is another's now")
+    os.utime(left, (1e9, 1e9))
     done = list(evaluate(wanted(), tmp_path, n_jobs=1))
     assert len(done) == 12 and [d.simulated_time for d in done[: len(before)]] == [None] * len(before)
     assert all(d.simulated_time for d in done[len(before) :])
+    assert not left.exists()
     after = episodes(tmp_path)
     assert {name: after[name] for name in before} == before
     write_report(tmp_path)

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pooch
 from pooch.downloaders import HTTPDownloader
+from pooch.hashes import hash_matches
 
+from socialnav_mj.files import written_whole
 from socialnav_mj.recordings.catalogue import CatalogueRow, catalogue, catalogue_row
 
 Progress = Callable[[str, int, int], None]
@@ -59,17 +61,19 @@ def fetch_row(row: CatalogueRow, root: Path, *, progress: Progress | None = None
     folder = root / row.folder
     paths = []
     for name, digest in expected.items():
-        url = f"{row.url}{name}"
+        path, url, known = folder / name, f"{row.url}{name}", f"sha256:{digest}"
         bar = None if progress is None else _Bar(name, progress)
         downloader = HTTPDownloader(progressbar=bar, timeout=TIMEOUT)
         try:
-            path = pooch.retrieve(url, f"sha256:{digest}", fname=name, path=folder, downloader=downloader)
+            if not (path.is_file() and hash_matches(str(path), known)):
+                # Not pooch.retrieve: what a kill leaves of its temporary files nobody would know as such.
+                with written_whole(path) as part:
+                    downloader(url, str(part), None)
+                    hash_matches(str(part), known, strict=True, source=name)
         except (OSError, ValueError) as error:
             # requests' errors are OSErrors; pooch reports a wrong checksum, with both sums, as ValueError.
-            raise FetchError(
-                f"could not fetch {folder / name} of recording {row.name!r} from {url}: {error}"
-            ) from error
-        paths.append(Path(path))
+            raise FetchError(f"could not fetch {path} of recording {row.name!r} from {url}: {error}") from error
+        paths.append(path)
     return tuple(paths)
 
 
