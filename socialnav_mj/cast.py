@@ -1,7 +1,6 @@
 """Who is replaced and who is replayed, on the grid of control steps and with a slot for everybody."""
 
 from dataclasses import dataclass, fields
-from heapq import heappop, heappush
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array, quaternion_of_yaw
 from socialnav_mj.recordings import Recording
 from socialnav_mj.recordings.draw import replaced_people
+from socialnav_mj.slots import share_slots
 
 NOBODY = -1
 """Index that stands for an empty slot."""
@@ -101,8 +101,8 @@ def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
     distance = np.linalg.norm(goal - start, axis=1)
     allowed = np.array([scenario.allowed_steps(d) for d in distance], dtype=np.int64)
     heading = np.array([recording.person(i).at(recording.start_time[i : i + 1])[2][0] for i in agents])
-    _, n_agent_slots = _slots(first[agents], first[agents] + allowed)
-    slot, n_slots = _slots(first[pedestrians], last[pedestrians])
+    agent_slot = share_slots(first[agents], first[agents] + allowed)
+    slot = share_slots(first[pedestrians], last[pedestrians])
     return Cast(
         agent_index=agents,
         agent_person=recording.ids[agents],
@@ -111,31 +111,14 @@ def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
         agent_heading=heading,
         agent_appear_step=first[agents],
         agent_allowed_steps=allowed,
-        n_agent_slots=n_agent_slots,
+        n_agent_slots=int(agent_slot.max()) + 1,
         pedestrian_index=pedestrians,
         pedestrian_person=recording.ids[pedestrians],
         pedestrian_first_step=first[pedestrians],
         pedestrian_last_step=last[pedestrians],
         pedestrian_slot=slot,
-        n_pedestrian_slots=max(1, n_slots),
+        n_pedestrian_slots=int(slot.max(initial=0)) + 1,
     )
-
-
-def _slots(first: IntArray, last: IntArray) -> tuple[IntArray, int]:
-    """Smallest set of slots such that no two intervals [first, last] of one slot overlap (greedy colouring)."""
-    slot = np.zeros(len(first), dtype=np.int64)
-    free: list[int] = []
-    busy: list[tuple[int, int]] = []
-    count = 0
-    for i in np.argsort(first, kind="stable"):
-        while busy and busy[0][0] < first[i]:
-            heappush(free, heappop(busy)[1])
-        if not free:
-            heappush(free, count)
-            count += 1
-        slot[i] = heappop(free)
-        heappush(busy, (int(last[i]), int(slot[i])))
-    return slot, count
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,11 +1,14 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, with equal bytes for equal content."""
 
+import csv
 import fcntl
+import io
 import json
+import math
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -116,3 +119,28 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
         content: JSON values.
     """
     write_whole(path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())
+
+
+def csv_bytes(columns: Sequence[str], rows: Iterable[Mapping[str, Any]], *, number: str = "") -> bytes:
+    """A table as CSV, equal bytes for equal content.
+
+    Args:
+        columns: In their order.
+        rows: Value of every column; NaN is written as nothing.
+        number: How numbers with a point are written, as in `format`; by default with all digits that tell them apart.
+
+    Returns:
+        UTF-8 text, a line for the columns and one for each row.
+    """
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow(
+            {key: _number(value, number) if isinstance(value, float) else value for key, value in row.items()}
+        )
+    return text.getvalue().encode()
+
+
+def _number(value: float, number: str) -> str:
+    return "" if math.isnan(value) else format(value, number)

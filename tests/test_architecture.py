@@ -16,7 +16,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 # `episode` stands above the simulator although it is filled after it: it is a record of numpy arrays, and physics and
 # task share its Outcome and Partner.
 ROWS = (
-    {"resources", "geometry", "config", "files", "processes"},
+    {"resources", "geometry", "config", "files", "processes", "slots"},
     {"recordings"},
     {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
     {"cast", "scene", "scene_index", "touch", "physics", "sample", "collision", "entrance", "task", "environment"},

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from socialnav_mj.files import clear_leftovers, write_whole, written_whole
+from socialnav_mj.files import clear_leftovers, csv_bytes, write_whole, written_whole
 from socialnav_mj.resources import assets_folder, data_folder
 
 
@@ -108,3 +108,10 @@ def test_folders_are_found_from_any_directory(tmp_path: Path, monkeypatch: pytes
     for name in ("robot.xml", "pedestrian.xml", "arena.xml"):
         assert (assets_folder() / name).is_file()
     assert data_folder().is_absolute()
+
+
+def test_table_is_written_with_all_digits_or_with_those_asked_for() -> None:
+    rows = [{"a": 1, "b": 1.0 / 3.0, "c": "x, y"}, {"a": 2, "b": float("nan"), "c": ""}]
+    assert csv_bytes(["a", "b", "c"], rows) == b'a,b,c\n1,0.3333333333333333,"x, y"\n2,,\n'
+    assert csv_bytes(["a", "b", "c"], rows, number=".3g") == b'a,b,c\n1,0.333,"x, y"\n2,,\n'
+    assert csv_bytes(["a", "b"], []) == b"a,b\n"

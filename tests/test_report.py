@@ -20,7 +20,7 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode, EpisodeError, Outcome
 from socialnav_mj.report import writer
 from socialnav_mj.report.agents import SCHEMA, agents_table, read_results
-from socialnav_mj.report.estimates import MEASURES, estimate, summarise
+from socialnav_mj.report.estimates import MEASURES, draw_means, estimate, summarise
 
 LABELS = {"dataset": "d", "variant": "v", "scenario": "s", "controller": "c", "measure": "m"}
 CONTROLLERS = ("zigzag", "human", "potential_field")
@@ -144,6 +144,12 @@ def test_estimate_says_why_it_has_no_interval(values, note):
     result = estimate(array, np.ones(len(array)), np.arange(len(array)), labels=LABELS)
     assert result.note == note
     assert math.isnan(result.low) == ("needs" in note or "no agent" in note)
+
+
+def test_means_of_draws_weigh_agents_and_leave_out_draws_without_values():
+    values, weights = np.array([1.0, 4.0, np.nan, 2.0, 9.0]), np.array([3.0, 1.0, 1.0, 1.0, 0.0])
+    draws, means = draw_means(values, weights, np.array([7, 7, 3, 5, 5]))
+    assert draws.tolist() == [5, 7] and means.tolist() == [2.0, 1.75]
 
 
 def test_interval_covers_the_mean_of_normal_draws_about_as_often_as_it_says():

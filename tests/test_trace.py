@@ -13,7 +13,7 @@ from rerun.chunk import RrdReader
 
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.trace.events import events
-from socialnav_mj.trace.lanes import assign_lanes, policy_changes, state_changes
+from socialnav_mj.trace.lanes import policy_changes, state_changes
 from socialnav_mj.trace.writer import chosen_agents, write_trace
 
 Rows = dict[int, Any]
@@ -263,18 +263,6 @@ def test_lanes_in_the_file_carry_numbers_and_states(path: Path) -> None:
     assert static["/lanes/state/00"]["StateConfiguration:labels"] == ["3", "3", "3"]
     chosen = rows["/chosen/policy/robot_3"]["StateChange:state"]
     assert [v[0] for _, v in sorted(chosen.items())] == ["cautious", "bold", ""]
-
-
-def test_lanes_are_as_few_as_overlaps_allow() -> None:
-    random = np.random.default_rng(1)
-    begin = random.integers(0, 100, 60).astype(float)
-    end = begin + random.integers(1, 12, 60).astype(float)
-    lanes = assign_lanes(begin, end)
-    for lane in np.unique(lanes):
-        order = np.argsort(begin[lanes == lane])
-        assert np.all(begin[lanes == lane][order][1:] > end[lanes == lane][order][:-1])
-    most = max(int(np.sum((begin <= t) & (t <= end))) for t in np.concatenate([begin, end]))
-    assert len(np.unique(lanes)) == lanes.max() + 1 == most
 
 
 def test_chosen_robots_are_the_hardest_hit_first(episode: Episode) -> None:

@@ -114,7 +114,8 @@ def summarise(agents: pa.Table) -> list[Estimate]:
     return [
         estimate(values, weights, draws, labels={**labels, "measure": measure})
         for labels, columns, draws in groups(agents)
-        for measure, values, weights in _measured(columns)
+        for measure in MEASURES
+        for values, weights in [measured(columns, measure)]
     ]
 
 
@@ -133,11 +134,8 @@ def estimate(values: Array, weights: Array, draws: NDArray[np.int64], *, labels:
     Returns:
         The estimate.
     """
-    defined = np.isfinite(values) & (weights > 0.0)
-    values, weights, draws = values[defined], weights[defined], draws[defined]
-    unit, index = np.unique(draws, return_inverse=True)
-    means = np.bincount(index, weights * values) / np.bincount(index, weights)
-    count = len(unit)
+    _, means = draw_means(values, weights, draws)
+    count = len(means)
     mean = standard_error = low = high = float("nan")
     note = ""
     if count >= 1:
@@ -163,9 +161,30 @@ def estimate(values: Array, weights: Array, draws: NDArray[np.int64], *, labels:
         low=low,
         high=high,
         n_draws=count,
-        n_agents=len(values),
+        n_agents=int(_defined(values, weights).sum()),
         note=note,
     )
+
+
+def draw_means(values: Array, weights: Array, draws: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    """Weighted mean of every draw that has an agent with a value.
+
+    Args:
+        values: One for each agent, shape (n,); NaN where it has none.
+        weights: Of the agents within their draw, shape (n,), >= 0.
+        draws: Draw of each agent, shape (n,).
+
+    Returns:
+        The draws, ascending, and their means, both of shape (k,).
+    """
+    defined = _defined(values, weights)
+    values, weights = values[defined], weights[defined]
+    unit, index = np.unique(draws[defined], return_inverse=True)
+    return unit, np.bincount(index, weights * values) / np.bincount(index, weights)
+
+
+def _defined(values: Array, weights: Array) -> NDArray[np.bool_]:
+    return np.isfinite(values) & (weights > 0.0)
 
 
 def groups(table: pa.Table) -> Iterator[tuple[dict[str, str], Columns, NDArray[np.int64]]]:
@@ -188,8 +207,15 @@ def groups(table: pa.Table) -> Iterator[tuple[dict[str, str], Columns, NDArray[n
         yield dict(zip(names, key, strict=True)), columns, columns["draw"]
 
 
-def _measured(columns: Columns) -> Iterator[tuple[str, Array, Array]]:
-    for measure, value in MEASURES.items():
-        values = np.asarray(value(columns), dtype=float)
-        weights = columns[WEIGHTS[measure]].astype(float) if measure in WEIGHTS else np.ones_like(values)
-        yield measure, values, weights
+def measured(columns: Columns, measure: str) -> tuple[Array, Array]:
+    """A measure of every agent, and the agent's weight within its draw.
+
+    Args:
+        columns: Of some agents.
+        measure: Key of `MEASURES`.
+
+    Returns:
+        Both of shape (n,); the value is NaN where there is none.
+    """
+    values = np.asarray(MEASURES[measure](columns), dtype=float)
+    return values, columns[WEIGHTS[measure]].astype(float) if measure in WEIGHTS else np.ones_like(values)

@@ -2,6 +2,10 @@
 
 import re
 from collections.abc import Sequence
+from math import isnan
+from typing import Literal
+
+Sign = Literal["", "+"]
 
 _BREAKS = re.compile("[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]+")
 _MEANS = str.maketrans({"<": "&lt;", "`": "\\`", "|": "\\|"})
@@ -69,3 +73,49 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
         Lines.
     """
     return [*head(headings), *(row(cells) for cells in rows), ""]
+
+
+def number(value: float, digits: int, sign: Sign = "") -> str:
+    """A number as a cell.
+
+    Args:
+        value: NaN if there is none.
+        digits: Behind the point.
+        sign: "+" to write the sign of what is positive too, as of a difference.
+
+    Returns:
+        "-" where there is nothing to tell.
+    """
+    return "-" if isnan(value) else f"{value:{sign}.{digits}f}"
+
+
+def bounds(low: float, high: float, digits: int = 3, sign: Sign = "") -> str:
+    """The ends of an interval as a cell.
+
+    Args:
+        low: NaN if there is no interval.
+        high: The other end.
+        digits: Behind the point.
+        sign: See `number`.
+
+    Returns:
+        "-" where there is nothing to tell.
+    """
+    return "-" if isnan(low) else f"{number(low, digits, sign)} to {number(high, digits, sign)}"
+
+
+def interval(mean: float, low: float, high: float, digits: int = 3, sign: Sign = "") -> str:
+    """A mean with its interval, as far as there is one, as a cell.
+
+    Args:
+        mean: NaN if there is none.
+        low: NaN if there is no interval.
+        high: The other end.
+        digits: Behind the point.
+        sign: See `number`.
+
+    Returns:
+        "-" where there is nothing to tell.
+    """
+    alone = isnan(mean) or isnan(low)
+    return number(mean, digits, sign) + ("" if alone else f" ({bounds(low, high, digits, sign)})")

@@ -8,8 +8,7 @@ import numpy as np
 import pyarrow as pa
 from scipy.stats import t as student
 
-from socialnav_mj.geometry import Array
-from socialnav_mj.report.estimates import CONFIDENCE, MEASURES, WEIGHTS, Columns, groups
+from socialnav_mj.report.estimates import CONFIDENCE, MEASURES, Columns, draw_means, groups, measured
 
 TARGETS = {"success": 0.05, "time_under_way": 1.0, "intrusion_share": 0.05, "minimum_distance": 0.05}
 """Measures and the differences that the report asks for, in the measure's unit."""
@@ -137,10 +136,5 @@ _PLACE: Sequence[str] = ("dataset", "variant", "scenario")
 
 
 def _draw_means(columns: Columns, measure: str) -> dict[int, float]:
-    values = np.asarray(MEASURES[measure](columns), dtype=float)
-    weights: Array = columns[WEIGHTS[measure]].astype(float) if measure in WEIGHTS else np.ones_like(values)
-    defined = np.isfinite(values) & (weights > 0.0)
-    values, weights, draws = values[defined], weights[defined], columns["draw"][defined]
-    unit, index = np.unique(draws, return_inverse=True)
-    means = np.bincount(index, weights * values) / np.bincount(index, weights)
+    unit, means = draw_means(*measured(columns, measure), columns["draw"])
     return dict(zip(unit.tolist(), means.tolist(), strict=True))

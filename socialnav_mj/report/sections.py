@@ -1,6 +1,5 @@
 """Sections of report.md: who was at fault, how hard, agents beside those they replaced, how many draws it takes."""
 
-import math
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
@@ -10,7 +9,7 @@ import pyarrow as pa
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.severity import Severity
 from socialnav_mj.report.estimates import Columns, Estimate, groups
-from socialnav_mj.report.markdown import table
+from socialnav_mj.report.markdown import interval, table
 from socialnav_mj.report.paired import DIFFERENCES
 from socialnav_mj.report.power import Resolution, told
 
@@ -127,7 +126,9 @@ def paired_section(differences: Sequence[Estimate], figure: str) -> list[str]:
     rows: Rows = []
     for key, group in groupby(differences, key=lambda e: (e.dataset, e.variant, e.scenario, e.controller)):
         row = {e.measure: e for e in group}
-        cells = [_difference(row[name], _DIFFERENCES[name][1]) for name in DIFFERENCES]
+        cells = [
+            interval(row[name].mean, row[name].low, row[name].high, _DIFFERENCES[name][1], "+") for name in DIFFERENCES
+        ]
         rows.append([_place_of(*key[:3]), key[3], *cells, str(row["time"].n_agents), str(row["time"].n_draws)])
     picture = f"![Differences between agents and the people they replaced]({figure})"
     return ["## Beside the people they replaced", "", _PAIRED, picture, "", *table(headings, rows)]
@@ -166,13 +167,6 @@ def _fault_cells(columns: Columns) -> list[str]:
     agents += [count(agent & (who == name)) / 2 for name in ("both", "neither")]
     repeated = count(person & ~columns["first"]) + count(agent & ~columns["first"]) / 2
     return [f"{value:g}" for value in (*people, *agents, repeated)]
-
-
-def _difference(estimate: Estimate, digits: int) -> str:
-    if math.isnan(estimate.mean):
-        return "-"
-    interval = "" if math.isnan(estimate.low) else f" ({estimate.low:+.{digits}f} to {estimate.high:+.{digits}f})"
-    return f"{estimate.mean:+.{digits}f}{interval}"
 
 
 def _place(labels: dict[str, str]) -> str:

@@ -1,7 +1,5 @@
 """Run folder -> agents.parquet, summaries, report.md, tables, figures and traces; everything but the episodes."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterator, Sequence
@@ -18,10 +16,10 @@ from rich.table import Table
 from rich.text import Text
 
 from socialnav_mj.episode import Episode
-from socialnav_mj.files import write_whole
+from socialnav_mj.files import csv_bytes, write_whole
 from socialnav_mj.report.agents import Results, Source, read_results, scenario_configuration
 from socialnav_mj.report.estimates import Estimate, summarise
-from socialnav_mj.report.markdown import code, head, plain, row
+from socialnav_mj.report.markdown import bounds, code, head, number, plain, row
 from socialnav_mj.report.paired import paired_differences
 from socialnav_mj.report.paired_figure import paired_figure
 from socialnav_mj.report.power import resolutions
@@ -165,8 +163,8 @@ def _tables(
     return {
         "agents.parquet": _parquet(results.agents),
         "tables/collisions.parquet": _parquet(results.contacts),
-        "tables/paired.csv": _csv(differences).encode(),
-        "summary.csv": _csv(estimates).encode(),
+        "tables/paired.csv": _csv(differences),
+        "summary.csv": _csv(estimates),
         "summary.json": (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode(),
         "report.md": _markdown(summary, estimates, sections).encode(),
     }
@@ -209,14 +207,8 @@ def _by_scenario(
 
 
 def _cell(estimate: Estimate, digits: int) -> str:
-    if math.isnan(estimate.mean):
-        return "-"
-    error = "" if math.isnan(estimate.standard_error) else f" ± {estimate.standard_error:.{digits}f}"
-    return f"{estimate.mean:.{digits}f}{error}"
-
-
-def _interval(estimate: Estimate) -> str:
-    return "-" if math.isnan(estimate.low) else f"{estimate.low:.3f} to {estimate.high:.3f}"
+    error = "" if math.isnan(estimate.standard_error) else f" ± {number(estimate.standard_error, digits)}"
+    return number(estimate.mean, digits) + error
 
 
 def _summary(results: Results, estimates: Sequence[Estimate], command: str | None) -> dict[str, Any]:
@@ -288,7 +280,9 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: 
         for controller, own in rows:
             cells = [_cell(own[measure], digits) for _, measure, digits in _COLUMNS]
             counts = [str(own["success"].n_draws), str(own["success"].n_agents)]
-            lines.append(row([controller, cells[0], _interval(own["success"]), *cells[1:], *counts]))
+            lines.append(
+                row([controller, cells[0], bounds(own["success"].low, own["success"].high), *cells[1:], *counts])
+            )
         lines.append("")
     lines += sections
     lines += ["## How to read it", "", _HOW_TO_READ, "## Traceability", "", "Recordings:", ""]
@@ -313,14 +307,8 @@ def _markdown(summary: dict[str, Any], estimates: Sequence[Estimate], sections: 
     return "\n".join(lines) + "\n"
 
 
-def _csv(estimates: Sequence[Estimate]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [field.name for field in fields(Estimate)], lineterminator="\n")
-    writer.writeheader()
-    for estimate in estimates:
-        row = asdict(estimate)
-        writer.writerow({k: "" if isinstance(v, float) and math.isnan(v) else v for k, v in row.items()})
-    return text.getvalue()
+def _csv(estimates: Sequence[Estimate]) -> bytes:
+    return csv_bytes([field.name for field in fields(Estimate)], map(asdict, estimates))
 
 
 def _parquet(table: pa.Table) -> bytes:

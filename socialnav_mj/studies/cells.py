@@ -1,7 +1,6 @@
 """Levels as cells of the tables in Markdown."""
 
-from math import isnan
-
+from socialnav_mj.report.markdown import Sign, interval, number
 from socialnav_mj.studies.levels import Level
 
 
@@ -15,18 +14,17 @@ def mean_cell(level: Level | None, digits: int) -> str:
     Returns:
         "-" where there is nothing to tell.
     """
-    return "-" if level is None or isnan(level.interval.mean) else f"{level.interval.mean:.{digits}f}"
+    return "-" if level is None else number(level.interval.mean, digits)
 
 
-def interval_cell(level: Level | None) -> str:
+def interval_cell(level: Level | None, sign: Sign = "") -> str:
     """A mean, and its interval for other draws and other trainings as far as there is one.
 
     Args:
         level: None if there is none.
+        sign: "+" to write the sign of what is positive too.
 
     Returns:
-        Three digits behind the point.
+        Three digits behind the point; "-" where there is nothing to tell.
     """
-    if level is None or isnan(level.interval.low):
-        return mean_cell(level, 3)
-    return f"{mean_cell(level, 3)} ({level.interval.low:.3f} to {level.interval.high:.3f})"
+    return "-" if level is None else interval(level.interval.mean, level.interval.low, level.interval.high, 3, sign)

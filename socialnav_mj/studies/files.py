@@ -1,8 +1,6 @@
 """What a study leaves behind: tables, where they come from, and a copy of what may travel with the project."""
 
-import csv
 import hashlib
-import io
 import json
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from socialnav_mj.controllers.replay_irl import load_policy
-from socialnav_mj.files import write_whole
+from socialnav_mj.files import csv_bytes, write_whole
 from socialnav_mj.report.agents import Results
 from socialnav_mj.studies.levels import Level
 from socialnav_mj.studies.study import Study
@@ -104,16 +102,7 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         path: Target.
         rows: All with the columns of the first.
     """
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({k: _text(v) if isinstance(v, float) else v for k, v in row.items()})
-    write_whole(path, text.getvalue().encode())
-
-
-def _text(value: float) -> str:
-    return "" if value != value else f"{value:.6g}"
+    write_whole(path, csv_bytes(list(rows[0]) if rows else [], rows, number=".6g"))
 
 
 def publish(out: Path, folder: Path, names: Iterable[str]) -> Path:

@@ -8,7 +8,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from socialnav_mj.geometry import Array
-from socialnav_mj.report.estimates import MEASURES, WEIGHTS, Columns
+from socialnav_mj.report.estimates import MEASURES, WEIGHTS, Columns, draw_means
 from socialnav_mj.report.paired import HUMAN
 
 POTENTIAL_FIELD, REPLAY_IRL, MIXED = "potential_field", "replay_irl", "mixed"
@@ -119,11 +119,11 @@ class Panel:
             own = [term for term in terms if term.scenario == scenario]
             values = [self.values(t.method, scenario, t.measure, training) for t in own]
             counted = np.all([np.isfinite(value) & (weight > 0.0) for value, weight in values], axis=0)
-            index = np.searchsorted(draws, self.draws[scenario][counted])
             for term, (value, weight) in zip(own, values, strict=True):
-                mass = np.bincount(index, weight[counted], minlength=len(draws))
-                heap = np.bincount(index, (weight * value)[counted], minlength=len(draws))
-                total += term.factor * np.divide(heap, mass, out=np.full(len(draws), np.nan), where=mass > 0.0)
+                unit, means = draw_means(value[counted], weight[counted], self.draws[scenario][counted])
+                of_draws = np.full(len(draws), np.nan)
+                of_draws[np.searchsorted(draws, unit)] = means
+                total += term.factor * of_draws
         return total
 
     def values(self, method: str, scenario: str, measure: str, training: int | None) -> tuple[Array, Array]:

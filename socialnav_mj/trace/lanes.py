@@ -1,10 +1,8 @@
-"""When each agent changed its state or its policy, and how many agents share one lane of a time line."""
+"""When each agent changed its state or its policy: the lanes of a time line."""
 
-import heapq
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from socialnav_mj.episode import Episode, Outcome
 from socialnav_mj.geometry import Array
@@ -89,25 +87,3 @@ def policy_changes(episode: Episode) -> list[list[Change]]:
         state = episode.policies[index] if index >= 0 else ""
         result[agent].append(Change(time=float(episode.time[step]), state=state))
     return result
-
-
-def assign_lanes(begin: Array, end: Array) -> NDArray[np.int64]:
-    """Give intervals the fewest lanes, so that no two in one lane overlap or meet; the lowest free lane is taken.
-
-    Args:
-        begin: (n,) beginnings [s].
-        end: (n,) ends, not before the beginnings [s].
-
-    Returns:
-        Lane of each interval, shape (n,), counted from 0.
-    """
-    lanes = np.zeros(len(begin), dtype=np.int64)
-    free: list[int] = []
-    busy: list[tuple[float, int]] = []
-    for i in np.argsort(begin, kind="stable").tolist():
-        while busy and busy[0][0] < begin[i]:
-            heapq.heappush(free, heapq.heappop(busy)[1])
-        lane = heapq.heappop(free) if free else len(busy)
-        lanes[i] = lane
-        heapq.heappush(busy, (float(end[i]), lane))
-    return lanes

@@ -34,9 +34,10 @@ from socialnav_mj.files import written_whole
 from socialnav_mj.metrics.collisions import collisions
 from socialnav_mj.metrics.navigation import success
 from socialnav_mj.metrics.proximity import INTIMATE_DISTANCE, nearest_pedestrian_distance
+from socialnav_mj.slots import share_slots
 from socialnav_mj.trace import layout as look
 from socialnav_mj.trace.events import events, touch_rows
-from socialnav_mj.trace.lanes import Change, assign_lanes, policy_changes, state_changes
+from socialnav_mj.trace.lanes import Change, policy_changes, state_changes
 from socialnav_mj.trace.scene import bounds, write_scene
 from socialnav_mj.trace.sink import Sink
 
@@ -196,7 +197,7 @@ def _lanes(
         _lane(sink, f"/chosen/{what}/robot_{person[agent]}", changes[agent], colours)
     shown = [i for i, own in enumerate(changes) if own]
     begin = np.array([changes[i][0].time for i in shown])
-    lanes = assign_lanes(begin, np.array([changes[i][-1].time for i in shown]))
+    lanes = share_slots(begin, np.array([changes[i][-1].time for i in shown]))
     for lane in range(lanes.max(initial=-1) + 1):
         members = np.flatnonzero(lanes == lane)
         agents = [shown[k] for k in members[np.argsort(begin[members], kind="stable")]]

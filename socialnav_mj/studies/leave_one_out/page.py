@@ -1,14 +1,13 @@
 """README.md of leave-one-recording-out: in-sample and held-out policies side by side."""
 
 from collections.abc import Mapping, Sequence
-from math import isnan
 from typing import Any
 
 from socialnav_mj.report.markdown import table
 from socialnav_mj.studies.cells import interval_cell
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.leave_one_out.comparison import DIFFERENCES, SideBySide
-from socialnav_mj.studies.levels import Level, LevelTable
+from socialnav_mj.studies.levels import LevelTable
 from socialnav_mj.studies.looks import LOOKS, SCENARIO_TITLES
 from socialnav_mj.studies.panel import REPLAY_IRL
 
@@ -58,7 +57,7 @@ def _differences(compared: Sequence[SideBySide]) -> list[str]:
         for scenario in found.scenarios:
             for name in dict.fromkeys(level.method for level in side.differences):
                 own = [found.find(scenario, name, measure) for measure in DIFFERENCES]
-                cells = [_signed(level) for level in own if level is not None]
+                cells = [interval_cell(level, "+") for level in own if level is not None]
                 rows.append([side.recording, SCENARIO_TITLES.get(scenario, scenario), _label(name), *cells])
     return table(
         ["recording", "scenario", "difference", *(heading for heading, _ in _COLUMNS[: len(DIFFERENCES)])], rows
@@ -82,11 +81,3 @@ def _levels(side: SideBySide) -> list[str]:
 
 def _label(method: str) -> str:
     return LOOKS[method].label if method in LOOKS else method.replace(f"{REPLAY_IRL}(", f"{LOOKS[REPLAY_IRL].label}(")
-
-
-def _signed(level: Level) -> str:
-    interval = level.interval
-    if isnan(interval.mean):
-        return "-"
-    bounds = "" if isnan(interval.low) else f" ({interval.low:+.3f} to {interval.high:+.3f})"
-    return f"{interval.mean:+.3f}{bounds}"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import isnan
 
-from socialnav_mj.report.markdown import head, row
+from socialnav_mj.report.markdown import bounds, head, row
 from socialnav_mj.studies.intervals import Interval
 from socialnav_mj.studies.paper.claims import COMPARABLE, Finding, Part, Verdict
 
@@ -56,9 +56,16 @@ def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[st
     lines += [f"Default setting: **{_verdict(finding)}**.", ""]
     lines += head(["comparison", "effect", "95 % interval", "for the trainings at hand", "verdict", "draws"])
     for part, interval, verdict in finding.parts:
-        given = _range(interval.low_given, interval.high_given)
+        given = bounds(interval.low_given, interval.high_given, sign="+")
         count = f"{interval.n_draws}" + (f" x {interval.n_trainings} trainings" if interval.n_trainings else "")
-        cells = [part.label, f"{interval.mean:+.3f}", _range(interval.low, interval.high), given, verdict, count]
+        cells = [
+            part.label,
+            f"{interval.mean:+.3f}",
+            bounds(interval.low, interval.high, sign="+"),
+            given,
+            verdict,
+            count,
+        ]
         lines.append(row(cells))
     lines += [row([label, "not run", "-", "-", "undecided", "0"]) for label in finding.missing] + [""]
     if others:
@@ -68,7 +75,7 @@ def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[st
                 lines.append(row([titles[name], other.verdict, "none was run", "-", "-", "0"]))
                 continue
             part, interval, _ = min(other.parts, key=_strength)
-            effect = [f"{interval.mean:+.3f}", _range(interval.low, interval.high)]
+            effect = [f"{interval.mean:+.3f}", bounds(interval.low, interval.high, sign="+")]
             lines.append(row([titles[name], _verdict(other), part.label, *effect, f"{interval.n_draws}"]))
         lines.append("")
     return lines
@@ -84,7 +91,3 @@ def _verdict(finding: Finding) -> str:
     if finding.verdict == finding.verdict_given:
         return finding.verdict
     return f"{finding.verdict} ({finding.verdict_given})"
-
-
-def _range(low: float, high: float) -> str:
-    return "-" if isnan(low) else f"{low:+.3f} to {high:+.3f}"
