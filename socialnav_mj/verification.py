@@ -22,7 +22,8 @@ from socialnav_mj.provenance import package_versions
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.catalogue import catalogue
 from socialnav_mj.report.agents import check_names
-from socialnav_mj.report.writer import RUN_FILE, read_run_file, report_tables
+from socialnav_mj.report.run_file import RUN_FILE, read_run_file
+from socialnav_mj.report.writer import report_tables
 from socialnav_mj.resources import assets_folder
 from socialnav_mj.rollout import rollout
 

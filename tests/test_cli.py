@@ -104,6 +104,11 @@ def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(c
     written = (folder / "report.md").read_bytes()
     main(["report", "runs/tiny", "--jobs", "1"])
     assert capsys.readouterr().out == output and (folder / "report.md").read_bytes() == written
+    main(["report", "runs/tiny", "--jobs", "1", "--dialect", "paper", "crowdnav"])
+    assert {path.name for path in (folder / "tables").glob("dialect_*")} == {
+        "dialect_paper.csv",
+        "dialect_crowdnav.csv",
+    }
 
 
 def test_settings_of_the_command_reach_the_episodes():

@@ -16,7 +16,7 @@ from socialnav_mj.report import power, writer
 from socialnav_mj.report.agents import read_results
 from socialnav_mj.report.collisions import CONTACT_SCHEMA
 from socialnav_mj.report.paired import DIFFERENCES, paired_differences
-from socialnav_mj.report.paired_figure import paired_figure
+from socialnav_mj.report.paired_figure import draw_paired
 from socialnav_mj.report.power import minimum_draws, resolutions, told
 from socialnav_mj.report.sections import draws_section
 
@@ -75,7 +75,7 @@ def written(run):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("socialnav_mj.trace.writer.write_trace", lambda *_: None)
         patch.setattr("socialnav_mj.report.estimates.N_RESAMPLES", 200)
-        return writer.write_report(run).read_text()
+        return writer.write_report(run).path.read_text()
 
 
 def section(text, heading):
@@ -166,10 +166,12 @@ def test_report_shows_pairs_and_their_figure(run, written):
     assert len((run / "tables" / "paired.csv").read_text().splitlines()) == 1 + 2 * len(DIFFERENCES)
 
 
-def test_figure_of_equal_numbers_has_equal_bytes(results):
+def test_figure_of_equal_numbers_has_equal_bytes(results, tmp_path):
     differences = paired_differences(results.agents)
-    assert paired_figure(differences) == paired_figure(differences)
-    assert paired_figure([]) == {}
+    one, two = (draw_paired(differences, tmp_path / name) for name in "ab")
+    assert [path.name for path in one] == ["paired_humans.png", "paired_humans.svg"]
+    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in two]
+    assert draw_paired([], tmp_path / "c") == [] and not (tmp_path / "c").exists()
 
 
 @given(spread=st.floats(1e-3, 10), ratio=st.floats(0.02, 5), power=st.sampled_from([0.5, 0.8, 0.95]))

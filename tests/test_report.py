@@ -16,8 +16,10 @@ from episodes import Agent, Pedestrian, Touch, build_episode, line
 from markdown_it import MarkdownIt
 from rich.console import Console
 
+from socialnav_mj.cli.terminal import terminal_tables
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode, EpisodeError, Outcome
+from socialnav_mj.metrics.dialects import compute
 from socialnav_mj.report import writer
 from socialnav_mj.report.agents import SCHEMA, agents_table, read_results
 from socialnav_mj.report.estimates import MEASURES, draw_means, estimate, summarise
@@ -164,7 +166,7 @@ def test_interval_covers_the_mean_of_normal_draws_about_as_often_as_it_says():
 
 
 def test_report_mentions_every_scenario_controller_and_hash(run):
-    text = writer.write_report(run).read_text()
+    text = writer.write_report(run).path.read_text()
     for word in ("scenario_1", "scenario_4", "10 % of", "90 % of", "socialnav-mj evaluate", "mujoco 3.17.0", "0" * 64):
         assert word in text, word
     lines = text.splitlines()
@@ -281,14 +283,36 @@ def test_episodes_of_different_controller_settings_are_not_compared(run):
 
 def test_uneven_draws_are_pointed_out(run):
     (run / "episodes" / "potential_field-0.1-3.npz").unlink()
-    text = writer.write_report(run).read_text()
+    text = writer.write_report(run).path.read_text()
     assert "**Warning**: the rows of made_up / by_hand / scenario_1 have different draws" in text
+
+
+def test_dialects_get_tables_with_the_same_draws_as_units(run):
+    """One of two agents arrives, and hits somebody in every other draw: success to the paper, not to Francis et al."""
+    writer.write_report(run, dialects=("paper", "francis2023"), n_jobs=2)
+    for dialect, success in (("paper", 0.25), ("francis2023", 0.5)):
+        rows = list(csv.DictReader((run / "tables" / f"dialect_{dialect}.csv").open()))
+        found = {(r["scenario"], r["controller"], r["measure"]): r for r in rows}
+        assert len(found) == len(rows) == 6 * len(compute(make(), dialect))
+        for scenario in ("scenario_1", "scenario_4"):
+            for controller in CONTROLLERS:
+                row = found[scenario, controller, "success"]
+                assert (float(row["mean"]), row["n_draws"], row["n_agents"]) == (success, "4", "8")
+    ours = {r["measure"]: r for r in csv.DictReader((run / "summary.csv").open()) if r["scenario"] == "scenario_4"}
+    last = {r["measure"]: r for r in csv.DictReader((run / "tables" / "dialect_paper.csv").open())}
+    for name in ("intimate_intrusions", "average_speed", "success"):
+        assert last[name] == ours[name]
+    shutil.rmtree(run / "tables")
+    with pytest.raises(ValueError, match=r"unknown dialect 'esperanto'; available: paper, socnavbench"):
+        writer.write_report(run, dialects=("esperanto",))
+    assert not (run / "tables").exists()
 
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_terminal_tables_fit_and_name_every_row(run, width):
     console = Console(width=width, record=True, file=io.StringIO())
-    writer.write_report(run, console=console)
+    for table in terminal_tables(writer.write_report(run).estimates):
+        console.print(table)
     text = console.export_text()
     for word in (*CONTROLLERS, "scenario_1", "scenario_4", "0.25", "0.14", "4 draw(s)", "[s]", "[m/s]"):
         assert word in text, word
@@ -309,7 +333,7 @@ def test_names_from_files_stay_text_in_the_report(name, tmp_path):
     make(name).save(tmp_path / "episodes" / "a.npz")
     run = {"command": f"evaluate {name}", "controllers": [], "episodes": ["a.npz"]}
     (tmp_path / "run.json").write_text(json.dumps(run))
-    text = writer.write_report(tmp_path).read_text()
+    text = writer.write_report(tmp_path).path.read_text()
     shown = lxml.html.fromstring(MarkdownIt("commonmark").enable("table").render(text))
     assert not shown.xpath("//script | //b | //a")
     cells = [cell.text_content() for cell in shown.xpath("//td[1]")]

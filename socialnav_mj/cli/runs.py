@@ -49,6 +49,7 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, then report."""
+        from socialnav_mj.cli.terminal import show
         from socialnav_mj.controllers import with_policy_of
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
         from socialnav_mj.report.writer import write_report
@@ -67,8 +68,9 @@ class Evaluate:
         episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)
         follow(episodes, jobs_of(evaluation))
         with errors.status("tables and traces"):
-            report = write_report(out, console=console, n_jobs=self.jobs)
-        say(f"report: {report}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)")
+            report = write_report(out, n_jobs=self.jobs)
+        show(report.estimates)
+        say(f"report: {report.path}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,15 +79,20 @@ class Report:
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
     """Of `evaluate`."""
+    dialect: tuple[str, ...] = ()
+    """Other benchmarks (paper, socnavbench, hunavsim, francis2023, crowdnav): tables/dialect_NAME.csv tells the metrics
+    as they define them, see docs/metrics.md."""
     jobs: int = -1
     """Processes; -1 for one a core."""
 
     def run(self) -> None:
         """Report."""
+        from socialnav_mj.cli.terminal import show
         from socialnav_mj.report.writer import write_report
 
-        path = write_report(self.folder, console=console, n_jobs=self.jobs)
-        say(f"report: {path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
+        report = write_report(self.folder, dialects=self.dialect, n_jobs=self.jobs)
+        show(report.estimates)
+        say(f"report: {report.path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
 
 
 @dataclass(frozen=True, kw_only=True)

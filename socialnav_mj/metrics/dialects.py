@@ -1,7 +1,7 @@
 """The same names as other benchmarks define them, so that their numbers and ours can be laid side by side.
 
 Each dialect is what its source's code or table says, on our Episode, one value per agent; docs/metrics.md tells the
-differences. Nothing here is used by the reports.
+differences. `socialnav-mj report FOLDER --dialect NAME` makes a table of them.
 """
 
 from collections.abc import Callable

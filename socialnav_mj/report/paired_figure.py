@@ -1,11 +1,12 @@
 """Figure of agents beside the people they replaced; readable in greyscale: controllers differ in mark and grey."""
 
-import io
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report.style import new_figure, save, style
 
 PANELS = (
     ("time", "time, censored [s]"),
@@ -17,44 +18,32 @@ PANELS = (
 
 _MARKS = "osD^vPX<>*"
 _GREYS = ("0.0", "0.45", "0.7", "0.25", "0.6")
-_FORMATS = ("png", "svg")
 
 
-def paired_figure(differences: Sequence[Estimate]) -> dict[str, bytes]:
+def draw_paired(differences: Sequence[Estimate], folder: Path) -> list[Path]:
     """Draw the paired differences, one panel a measure, scenarios along x, zero being the person itself.
 
     Args:
         differences: Of `paired.paired_differences`.
+        folder: Gets a PNG and an SVG, the same bytes for the same numbers.
 
     Returns:
-        File's content by format, "png" and "svg"; the same for the same numbers. Nothing if there is no number.
+        Their paths; none if there is no number.
     """
     shown = [e for e in differences if not math.isnan(e.mean)]
     if not shown:
-        return {}
-    # Not pyplot: it keeps figures and looks for a display.
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+        return []
     places = list(dict.fromkeys((e.dataset, e.variant, e.scenario) for e in shown))
     controllers = list(dict.fromkeys(e.controller for e in shown))
-    with rc_context({"svg.hashsalt": "socialnav-mj", "svg.fonttype": "none", "font.size": 9.0}):
-        figure = Figure(figsize=(10.0, 6.4), layout="constrained")
-        FigureCanvasAgg(figure)
+    with style():
+        figure = new_figure(4.8)
         for (measure, label), axes in zip(PANELS, figure.subplots(2, 2).flat, strict=True):
             _draw(axes, [e for e in shown if e.measure == measure], places, controllers)
             axes.set_ylabel(label)
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=min(5, len(labels)), frameon=False)
-        figure.supxlabel("agent minus the person it replaced; bars: 95 % interval over draws")
-        files = {}
-        for kind in _FORMATS:
-            stream = io.BytesIO()
-            metadata: dict[str, Any] = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
-            figure.savefig(stream, format=kind, dpi=150, metadata=metadata)
-            files[kind] = stream.getvalue()
-    return files
+        figure.legend(handles, labels, loc="outside upper center", ncols=min(5, len(labels)))
+        figure.supxlabel("agent minus the person it replaced; bars: 95 % interval over draws", fontsize=8.0)
+        return save(figure, folder, "paired_humans")
 
 
 def _draw(axes: Any, shown: Sequence[Estimate], places: Sequence[tuple[str, ...]], controllers: Sequence[str]) -> None:
@@ -74,11 +63,8 @@ def _draw(axes: Any, shown: Sequence[Estimate], places: Sequence[tuple[str, ...]
             fmt=_MARKS[i % len(_MARKS)],
             color=_GREYS[i % len(_GREYS)],
             markeredgecolor="0.0",
-            markersize=6.0,
-            capsize=3.0,
             linewidth=1.0,
             label=controller,
         )
     axes.set_xticks(range(len(places)), [name.replace("_", " ") for name in names])
     axes.set_xlim(-0.5, len(places) - 0.5)
-    axes.spines[["top", "right"]].set_visible(False)

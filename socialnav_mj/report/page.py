@@ -1,0 +1,135 @@
+"""report.md: results of a run to be read, how to read them, and where they come from."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Any
+
+from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report.markdown import bounds, code, head, number, plain, row
+
+_COLUMNS = (
+    ("success", "success", 3),
+    ("hit first by a pedestrian", "first_hit_pedestrian", 3),
+    ("hit first by an agent", "first_hit_agent", 3),
+    ("timed out", "timed_out", 3),
+    ("time of successes [s]", "completion_time_success", 1),
+    ("time, censored [s]", "time_under_way", 1),
+    ("path / displacement", "distance_to_displacement", 3),
+    ("intimate intrusions [steps]", "intimate_intrusions", 1),
+    ("share of steps within 1.2 m", "intrusion_share_of_steps", 3),
+    ("speed [m/s]", "average_speed", 3),
+)
+"""Heading, measure and digits of the columns of report.md; all measures are in summary.csv."""
+
+_HOW_TO_READ = """\
+Every cell is the mean over draws ± its standard error; a draw is one random choice of the people who are replaced, \
+and its mean over agents is one number. The 95 % interval is a bootstrap over draws (none for fewer than 3 draws, too \
+narrow for fewer than about 10). Controllers that share draws drove the same agents, so compare them draw by draw \
+(`agents.parquet`). All other measures, defined in docs/metrics.md, are in `summary.csv`; every collision is a row of \
+`tables/collisions.parquet`.
+
+- **human**: the recorded people themselves, each on its own track instead of the agent that replaced it, scored by \
+the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
+- **success**: arrived, and touched nobody on the way, whoever was at fault; over all agents.
+- **hit first by**: share of all agents whose first touch was with a replayed pedestrian, or with another agent.
+- **timed out**: share of all agents whose deadline passed.
+- **time of successes**: spawn to arrival, over successes alone. It flatters fragile controllers, whose successes are \
+the short trips; **time, censored** is over everybody who spawned and takes the time watched where an agent did not \
+arrive, a lower bound.
+- **path / displacement**: path traced over the straight distance from start to goal, over arrivals. The path ends \
+within the goal radius, so a straight run scores a little less than 1.
+- **intimate intrusions**: control steps with a replayed pedestrian's centre nearer than 1.2 m (the paper's number and \
+name; Hall's *personal* distance), per agent; **share** is over all steps under way. Other agents do not count.
+- **speed**: path over time under way, arrived or not.
+"""
+
+
+def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections: Sequence[str]) -> str:
+    """Everything that a run says, as Markdown.
+
+    Args:
+        summary: See `summary.summary_of`.
+        estimates: The same estimates.
+        sections: Lines that stand between the tables and how to read them.
+
+    Returns:
+        The text of report.md.
+    """
+    lines = ["# Report", ""]
+    lines += [f"Command: {code(summary['command'])}" if summary["command"] else "Command: not recorded (no run.json)."]
+    lines += ["", "Made from the episode files alone; `socialnav-mj report FOLDER` makes it again.", ""]
+    lines += [f"**Warning**: {plain(warning)}.\n" for warning in summary["warnings"]]
+    headings = ["controller", "success", "95 % interval", *(heading for heading, _, _ in _COLUMNS[1:])]
+    for (dataset, variant, scenario), rows in by_scenario(estimates):
+        share = next(
+            g["scenario_configuration"]["share"]
+            for g in summary["groups"]
+            if (g["dataset"], g["variant"], g["scenario"]) == (dataset, variant, scenario)
+        )
+        lines += [f"## {plain(f'{dataset} ({variant}), {scenario}')}: {100 * share:g} % of the people replaced", ""]
+        lines += head([*headings, "draws", "agents"])
+        for controller, own in rows:
+            cells = [with_error(own[measure], digits) for _, measure, digits in _COLUMNS]
+            counts = [str(own["success"].n_draws), str(own["success"].n_agents)]
+            lines.append(
+                row([controller, cells[0], bounds(own["success"].low, own["success"].high), *cells[1:], *counts])
+            )
+        lines.append("")
+    lines += sections
+    lines += ["## How to read it", "", _HOW_TO_READ, *_traceability(summary)]
+    return "\n".join(lines) + "\n"
+
+
+def _traceability(summary: dict[str, Any]) -> list[str]:
+    lines = ["## Traceability", "", "Recordings:", ""]
+    recordings = (f"{r['name']}, variant {r['variant']}, checksum {r['checksum']}" for r in summary["recordings"])
+    lines += [f"- {plain(text)}" for text in recordings]
+    lines += ["", "Versions:", ""]
+    versions = (", ".join(f"{name} {version}" for name, version in v.items()) for v in summary["versions"])
+    lines += [f"- {plain(text)}" for text in versions]
+    lines += ["", "Configurations (the draw's seed apart):", ""]
+    configurations: dict[str, Any] = {}
+    for group in summary["groups"]:
+        dataset = f"{group['dataset']} ({group['variant']})"
+        configurations[f"{group['scenario']} of {dataset}"] = group["scenario_configuration"]
+        configurations[f"{group['controller']} on {dataset}"] = group["controller_configuration"]
+    lines += [
+        f"- {plain(name)}: {code(json.dumps(value, sort_keys=True))}" for name, value in sorted(configurations.items())
+    ]
+    lines += ["", "Episodes:", "", *head(["file", "draw", "state hash"])]
+    lines += [
+        row([e["file"], str(e["draw"]), e["state_hash"]]) for group in summary["groups"] for e in group["episodes"]
+    ]
+    return lines
+
+
+def by_scenario(
+    estimates: Sequence[Estimate],
+) -> Iterator[tuple[tuple[str, str, str], list[tuple[str, dict[str, Estimate]]]]]:
+    """Estimates as the rows of tables.
+
+    Args:
+        estimates: Of `estimates.summarise`.
+
+    Yields:
+        (dataset, variant, scenario), and for each of its controllers the estimates by measure; in the given order.
+    """
+    for scenario, group in groupby(estimates, key=lambda e: (e.dataset, e.variant, e.scenario)):
+        rows = groupby(group, key=lambda e: e.controller)
+        yield scenario, [(controller, {e.measure: e for e in row}) for controller, row in rows]
+
+
+def with_error(estimate: Estimate, digits: int) -> str:
+    """A mean and its standard error, as far as there is one.
+
+    Args:
+        estimate: Of a measure.
+        digits: Behind the point.
+
+    Returns:
+        "-" where there is nothing to tell.
+    """
+    error = "" if math.isnan(estimate.standard_error) else f" ± {number(estimate.standard_error, digits)}"
+    return number(estimate.mean, digits) + error
