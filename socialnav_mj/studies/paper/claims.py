@@ -1,14 +1,10 @@
-"""The paper's results, sentence by sentence, as claims that can hold, fail, or stay undecided."""
+"""The paper's results, sentence by sentence, as comparisons that `findings` puts to the test."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
-from socialnav_mj.studies.intervals import Interval, two_way_interval
-from socialnav_mj.studies.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Panel, Term
-
-Verdict = Literal["holds", "fails", "undecided"]
+from socialnav_mj.studies.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Term
 
 SCENARIOS = ("scenario_1", "scenario_2", "scenario_3", "scenario_4")
 HUMANS_DOMINATE, AGENTS_DOMINATE = SCENARIOS[:2], SCENARIOS[2:]
@@ -41,21 +37,6 @@ class Claim:
     unit: str
     """Of the comparisons."""
     parts: tuple[Part, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """What an experiment says of a claim."""
-
-    claim: Claim
-    verdict: Verdict
-    """For other draws and other trainings."""
-    verdict_given: Verdict
-    """For other draws of the trainings at hand."""
-    parts: tuple[tuple[Part, Interval, Verdict], ...]
-    """Each comparison with its interval and its own verdict; those that were run."""
-    missing: tuple[str, ...]
-    """Labels of comparisons whose scenarios or methods were not run."""
 
 
 def _minus(one: str, other: str, scenario: str, measure: str, *, lower: bool = False) -> Part:
@@ -246,68 +227,3 @@ CLAIMS: tuple[Claim, ...] = (
     ),
 )
 """(a) to (f) of the project's plan, and (g): what else the paper's results say of the mixed policy."""
-
-
-def verdict_of(low: float, high: float) -> Verdict:
-    """Verdict of one comparison.
-
-    Args:
-        low: Lower end of its interval; NaN if there is none.
-        high: Upper end.
-
-    Returns:
-        "holds" above 0, "fails" below 0, else "undecided".
-    """
-    if low > 0.0:
-        return "holds"
-    return "fails" if high < 0.0 else "undecided"
-
-
-def verdict_of_all(verdicts: Iterable[Verdict]) -> Verdict:
-    """Verdict of a claim from those of its comparisons.
-
-    Args:
-        verdicts: One for each comparison.
-
-    Returns:
-        "holds" if all hold, "fails" if any fails, else "undecided".
-    """
-    listed = list(verdicts)
-    if "fails" in listed:
-        return "fails"
-    return "holds" if listed and set(listed) == {"holds"} else "undecided"
-
-
-def examine(panel: Panel, claims: Sequence[Claim] = CLAIMS) -> list[Finding]:
-    """What an experiment says of each claim.
-
-    Args:
-        panel: Of the experiment.
-        claims: To be examined.
-
-    Returns:
-        One finding a claim; comparisons that were not run leave it undecided unless another one fails.
-    """
-    return [_finding(panel, claim) for claim in claims]
-
-
-def _finding(panel: Panel, claim: Claim) -> Finding:
-    parts: list[tuple[Part, Interval, Verdict]] = []
-    given: list[Verdict] = []
-    missing = []
-    for part in claim.parts:
-        if not all(panel.has(term.method, term.scenario) for term in part.terms):
-            missing.append(part.label)
-            continue
-        trained = any(panel.is_trained(term.method) for term in part.terms)
-        interval = two_way_interval(panel.contrast(part.terms), trained=trained)
-        parts.append((part, interval, verdict_of(interval.low, interval.high)))
-        given.append(verdict_of(interval.low_given, interval.high_given))
-    lacking: list[Verdict] = ["undecided"] * len(missing)
-    return Finding(
-        claim=claim,
-        verdict=verdict_of_all([*(verdict for *_, verdict in parts), *lacking]),
-        verdict_given=verdict_of_all([*given, *lacking]),
-        parts=tuple(parts),
-        missing=tuple(missing),
-    )

@@ -1,7 +1,7 @@
 """Episodes of the experiment -> tables, figures, claims.md and README.md; all made again at every call."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +11,16 @@ import pyarrow.compute
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.provenance import recording_metadata
-from socialnav_mj.recordings import load_recording
+from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.studies.files import level_rows, provenance_of, write_csv
 from socialnav_mj.studies.held_out import held_out_levels, period_of_people
-from socialnav_mj.studies.levels import LevelTable, levels
+from socialnav_mj.studies.levels import Level, LevelTable, levels
 from socialnav_mj.studies.panel import MIXED, make_panel
-from socialnav_mj.studies.paper.claims import Finding, examine
 from socialnav_mj.studies.paper.claims_page import claims_page
 from socialnav_mj.studies.paper.figures import draw_figures, draw_sweep
+from socialnav_mj.studies.paper.findings import Finding, examine
 from socialnav_mj.studies.paper.page import experiment_page
 from socialnav_mj.studies.paper.plan import (
     DEFAULT,
@@ -56,50 +56,80 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         EpisodeError: If an episode is damaged or does not fit the others.
         ValueError: If the policies were trained on different parts of the recording.
     """
-    results = read_runs(experiment, out, n_jobs=n_jobs)
+    found = _found(experiment, read_runs(experiment, out, n_jobs=n_jobs))
+    _write_tables(found, out / "tables")
+    _draw(experiment, found, out / "figures")
     titles = {variant.name: variant.title for variant in experiment.settings}
-    tables: dict[str, LevelTable] = {}
-    findings: dict[str, list[Finding]] = {}
-    for variant in experiment.settings:
-        panel = make_panel(agents_of(experiment, variant, results), experiment.roster(variant))
-        tables[variant.name] = LevelTable(rows=tuple(levels(panel)))
-        findings[variant.name] = examine(panel)
-    sweep = _sweep(experiment, results, tables[DEFAULT.name])
-    recording = load_recording(experiment.dataset, data_dir=experiment.data_dir)
-    periods = period_of_people(recording, [load_policy(policy).card["config"] for policy in experiment.policies])
-    held_out = held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods)
-
-    write_csv(
-        out / "tables" / "levels.csv", [r for name, t in tables.items() for r in level_rows(t.rows, variant=name)]
-    )
-    write_csv(out / "tables" / "claims.csv", [row for name, f in findings.items() for row in _claim_rows(name, f)])
-    write_csv(out / "tables" / "held_out.csv", [r for name, t in held_out.items() for r in level_rows(t, period=name)])
-    swept = [
-        r for d, t in sweep.items() for r in level_rows([x for x in t.rows if x.method == MIXED], switch_distance=d)
-    ]
-    write_csv(out / "tables" / "switch_distance.csv", swept)
-    draw_figures(tables[DEFAULT.name], out / "figures")
-    if len(sweep) > 1:
-        draw_sweep(sweep, sweep[SWITCH_DISTANCE], out / "figures")
-    if experiment.variants:
-        draw_variants(tables, titles, out / "figures")
-    cards = {seed: load_policy(policy).card for seed, policy in experiment.trainings.items()}
-    if all("history" in card for card in cards.values()):
-        draw_training_curves(cards, out / "figures")
-    draw_reward_maps({f"training {k}": load_policy(p) for k, p in experiment.trainings.items()}, out / "figures")
-    write_whole(out / "claims.md", claims_page(findings, titles=titles, command=command).encode())
-    provenance = provenance_of(experiment, results, command=command)
-    provenance["recording"] = recording_metadata(recording)
+    write_whole(out / "claims.md", claims_page(found.findings, titles=titles, command=command).encode())
+    provenance = provenance_of(experiment, found.results, command=command)
+    provenance["recording"] = recording_metadata(found.recording)
     write_json(out / "provenance.json", provenance)
     page = experiment_page(
-        tables[DEFAULT.name],
-        findings[DEFAULT.name],
-        held_out=held_out,
-        sweep=sweep,
+        found.tables[DEFAULT.name],
+        found.findings[DEFAULT.name],
+        held_out=found.held_out,
+        sweep=found.sweep,
         has_variants=experiment.variants,
         provenance=provenance,
     )
     return write_whole(out / "README.md", page.encode())
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Found:
+    """Everything that the experiment's episodes come to."""
+
+    recording: Recording
+    results: dict[str, Results]
+    """Of each run."""
+    tables: dict[str, LevelTable]
+    """Of each setting."""
+    findings: dict[str, list[Finding]]
+    """Of each setting."""
+    sweep: dict[float, LevelTable]
+    """By switch distance [m]."""
+    held_out: dict[str, list[Level]]
+    """By period of the recording."""
+
+
+def _found(experiment: Experiment, results: dict[str, Results]) -> _Found:
+    panels = {
+        variant.name: make_panel(agents_of(experiment, variant, results), experiment.roster(variant))
+        for variant in experiment.settings
+    }
+    tables = {name: LevelTable(rows=tuple(levels(panel))) for name, panel in panels.items()}
+    recording = load_recording(experiment.dataset, data_dir=experiment.data_dir)
+    periods = period_of_people(recording, [load_policy(policy).card["config"] for policy in experiment.policies])
+    return _Found(
+        recording=recording,
+        results=results,
+        tables=tables,
+        findings={name: examine(panel) for name, panel in panels.items()},
+        sweep=_sweep(experiment, results, tables[DEFAULT.name]),
+        held_out=held_out_levels(results[DEFAULT.name].agents, experiment.roster(DEFAULT), periods),
+    )
+
+
+def _write_tables(found: _Found, folder: Path) -> None:
+    write_csv(folder / "levels.csv", [r for name, t in found.tables.items() for r in level_rows(t.rows, variant=name)])
+    write_csv(folder / "claims.csv", [row for name, f in found.findings.items() for row in _claim_rows(name, f)])
+    write_csv(folder / "held_out.csv", [r for name, t in found.held_out.items() for r in level_rows(t, period=name)])
+    mixed = {distance: [row for row in table.rows if row.method == MIXED] for distance, table in found.sweep.items()}
+    write_csv(
+        folder / "switch_distance.csv", [r for d, rows in mixed.items() for r in level_rows(rows, switch_distance=d)]
+    )
+
+
+def _draw(experiment: Experiment, found: _Found, folder: Path) -> None:
+    draw_figures(found.tables[DEFAULT.name], folder)
+    if len(found.sweep) > 1:
+        draw_sweep(found.sweep, found.sweep[SWITCH_DISTANCE], folder)
+    if experiment.variants:
+        draw_variants(found.tables, {variant.name: variant.title for variant in experiment.settings}, folder)
+    trained = {seed: load_policy(policy) for seed, policy in experiment.trainings.items()}
+    if all("history" in policy.card for policy in trained.values()):
+        draw_training_curves({seed: policy.card for seed, policy in trained.items()}, folder)
+    draw_reward_maps({f"training {seed}": policy for seed, policy in trained.items()}, folder)
 
 
 def agents_of(experiment: Experiment, variant: Variant, results: Mapping[str, Results]) -> pa.Table:

@@ -9,8 +9,8 @@ from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.levels import Level, LevelTable
 from socialnav_mj.studies.looks import LOOKS, SCENARIO_TITLES
 from socialnav_mj.studies.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
-from socialnav_mj.studies.paper.claims import Finding
 from socialnav_mj.studies.paper.figures import FIGURES
+from socialnav_mj.studies.paper.findings import Finding
 from socialnav_mj.studies.paper.training_curves import training_table
 
 _COLUMNS = (
