@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from socialnav_mj.recordings import Recording, load_recording
+from socialnav_mj.recordings import Reading, Recording, load_recording
 
 TINY = Path(__file__).parent / "data" / "tiny"
 # Diagonal scale and offset, and one that mixes axes and has perspective, as pixels -> metres.
@@ -90,7 +90,7 @@ def test_vsp_gives_the_same_tracks(homography: str, axis_order: str, tmp_path: P
     tiny = load_recording(TINY)
     write_vsp(tiny, tmp_path, HOMOGRAPHIES[homography], axis_order=axis_order)
     for path in (tmp_path, tmp_path / "annotation.vsp"):
-        found = load_recording(path, axis_order=axis_order)
+        found = load_recording(path, reading=Reading(axis_order=axis_order))
         assert found.variant == "vsp"
         assert_same_tracks(found, tiny)
 
@@ -100,7 +100,7 @@ def test_vsp_is_read_with_x_before_y_unless_told(tmp_path: Path) -> None:
     write_vsp(tiny, tmp_path, HOMOGRAPHIES["scale"], axis_order="xy")
     assert_same_tracks(load_recording(tmp_path), tiny)
     with pytest.raises(ValueError, match="axis_order = 'zx' is not allowed; allowed: xy, yx"):
-        load_recording(tmp_path, axis_order="zx")
+        Reading(axis_order="zx")
 
 
 def test_folder_with_two_annotations_reads_the_vsp_unless_told(tmp_path: Path) -> None:
@@ -113,11 +113,11 @@ def test_folder_with_two_annotations_reads_the_vsp_unless_told(tmp_path: Path) -
 
 
 def test_frame_rate_scales_time_and_checksum_does_not_change() -> None:
-    slow, fast = load_recording(TINY, frame_rate=12.5), load_recording(TINY)
+    slow, fast = load_recording(TINY, reading=Reading(frame_rate=12.5)), load_recording(TINY)
     assert slow.duration == pytest.approx(2.0 * fast.duration)
     assert slow.checksum == fast.checksum and len(fast.checksum) == 64
     with pytest.raises(ValueError, match=r"frame_rate = 0\.0 is not allowed"):
-        load_recording(TINY, frame_rate=0.0)
+        Reading(frame_rate=0.0)
 
 
 def test_ndjson_states_its_own_frame_rate(tmp_path: Path) -> None:
@@ -155,10 +155,14 @@ VSP_HEAD = "1 - the number of splines\n2 - Num of control points\n"
         ("a.txt", "0 1 0 0\n10 1 nan 0\n", r"a\.txt, line 2: x is 'nan'; expected a finite number"),
         ("a.txt", "0 1 0 0\n0 1 3 0\n", r"line 2: person 1 has a second position at frame 0 \(the first: line 1\)"),
         ("a.txt", "0 1 0 0\n0 2 3 0\n", r"2 people with at most one position; expected people with at least 2"),
-        ("a.txt", "# nothing\n", r"a\.txt: not recognised; expected one of the formats vsp, obsmat, text, ndjson"),
-        ("a.txt", "a b c d\n", r"a\.txt: not recognised"),
+        ("a.txt", "# nothing\n", r"a\.txt: nothing in it; expected one of"),
+        ("a.txt", "a b c d\n", r"a\.txt, line 1: 'a b c d' is not recognised; expected one of\n  text: "),
         ("obsmat.txt", "0 1 0 0 0 0 0 0\n1 1 0 0 0 0 0\n", r"obsmat\.txt, line 2: 7 numbers; expected 8: frame id x z"),
-        ("a.ndjson", '{"track": {"f": 0}}\n', r'line 1: track {"f": 0}; expected a track with f, p, x and y'),
+        (
+            "a.ndjson",
+            '{"track": {"f": 0}}\n',
+            r'line 1: {"track": {"f": 0}}; expected a track with the numbers f, p, x and y',
+        ),
         ("a.ndjson", '{"track": {"f": 0, "p": 1, "x": 0, "y": 0}}\n{"f"\n', r"line 2: no JSON \("),
         ("a.ndjson", '{"person": 1}\n', r'line 1: {"person": 1}; expected an object with "track" or "scene"'),
         ("a.ndjson", '{"scene": {"fps": 2.5}}\n{"scene": {"fps": 5}}\n', r"line 2: fps is 5; expected 2\.5, the same"),

@@ -1,5 +1,6 @@
 """Known recordings: where they come from, where they are looked for, what they must contain."""
 
+import logging
 import os
 import tomllib
 from collections.abc import Mapping
@@ -10,10 +11,13 @@ from typing import get_args
 
 import pooch
 
+from socialnav_mj.recordings.plausibility import doubts
 from socialnav_mj.recordings.readers import Variant, read_recording, sha256, source_files
+from socialnav_mj.recordings.reading import DEFAULT_READING, AxisOrder, Reading
 from socialnav_mj.recordings.recording import Recording
-from socialnav_mj.recordings.ucy import AxisOrder
 from socialnav_mj.resources import data_folder
+
+logger = logging.getLogger(__name__)
 
 DATA_VARIABLE = "SOCIALNAV_MJ_DATA"
 """Environment variable that names a data directory."""
@@ -88,21 +92,22 @@ def load_recording(
     *,
     variant: str | None = None,
     data_dir: str | Path | None = None,
-    frame_rate: float | None = None,
-    axis_order: AxisOrder | None = None,
+    reading: Reading = DEFAULT_READING,
+    warn: bool = True,
 ) -> Recording:
     """Load a recording by its name in the catalogue or by the path of a file or folder.
 
     A catalogue name wins over a path of the same spelling (write `./name` for the path). Files found by name are
     checked against their sha256. Files given by path whose sha256 the catalogue knows take its frame rate and axis
-    order; of others the frame rate is what the file states or 25 Hz, and the axis order is "xy".
+    order; of others the frame rate is what the file states or 25 Hz, and the axis order is "xy". The recording says
+    which of these it was (`frame_rate_origin`), and what looks wrong with its scale is logged as a warning.
 
     Args:
         name_or_path: For example `plaza`, `students003` or `recordings/mine.txt`.
         variant: Which of several annotations; None takes the default (see `source_files` for paths).
         data_dir: Looked into first.
-        frame_rate: Overrides that of the source [Hz].
-        axis_order: Overrides what the homography of a vsp takes.
+        reading: What the file does not say, or says wrongly, and bounds on what it may hold.
+        warn: Whether to log what looks wrong (see `doubts`).
 
     Returns:
         The recording.
@@ -111,16 +116,14 @@ def load_recording(
         ValueError: If the name, the variant or the format is unknown, or a file is not what it should be.
         FileNotFoundError: If the files are nowhere; says where they were looked for and what helps.
     """
-    if frame_rate is not None and not frame_rate > 0.0:
-        raise ValueError(f"frame_rate = {frame_rate!r} is not allowed; allowed: numbers > 0")
-    if axis_order is not None and axis_order not in get_args(AxisOrder):
-        raise ValueError(f"axis_order = {axis_order!r} is not allowed; allowed: {', '.join(get_args(AxisOrder))}")
     row: CatalogueRow | None
     if str(name_or_path) in catalogue():
         row = catalogue_row(str(name_or_path))
         name, kind = row.name, _variant(row, variant)
         files = _find(row, kind, data_dir)
         _verify(row, kind, files)
+        if reading.columns:
+            raise ValueError(f"columns = {' '.join(reading.columns)} is not allowed for a recording of the catalogue")
     else:
         path = Path(name_or_path).expanduser()
         if not path.exists():
@@ -128,13 +131,21 @@ def load_recording(
                 f"no recording {str(name_or_path)!r}: it is neither in the catalogue ({', '.join(catalogue())}) "
                 f"nor a file or folder"
             )
-        kind, files = source_files(path, _stated(variant))
+        kind, files = source_files(path, _stated(variant), columns=reading.columns)
         name = path.resolve().stem
         row = _known_by_checksum(kind, files)
-    if row is not None:
-        frame_rate = frame_rate or row.frame_rate
-        axis_order = axis_order or row.axis_order
-    return read_recording(files, name=name, variant=kind, frame_rate=frame_rate, axis_order=axis_order or "xy")
+    recording = read_recording(
+        files,
+        name=name,
+        variant=kind,
+        reading=reading,
+        known_rate=None if row is None else row.frame_rate,
+        known_axis_order=None if row is None else row.axis_order,
+    )
+    if warn:
+        for doubt in doubts(recording):
+            logger.warning("%s: %s", name_or_path, doubt)
+    return recording
 
 
 def _variant(row: CatalogueRow, variant: str | None) -> Variant:

@@ -15,6 +15,8 @@ HEADING_TIMESTEP = 0.04
 
 TIME_TOLERANCE = 1e-6
 """A time this near a track's end is on it, so that rounding does not decide who is there [s]."""
+_TABULATED_AT_ONCE = 500_000
+"""Rows of the table of headings that are made together; 200 bytes each while they are."""
 
 
 class Curves:
@@ -103,17 +105,27 @@ class Curves:
     def _tabulate_headings(self) -> None:
         """Table of (time of motion, direction) of every person; people who never move get one row of 0."""
         counts = np.ceil((self.end - self.start) / HEADING_TIMESTEP - 1e-9).astype(int) + 1
-        people = np.repeat(np.arange(len(counts)), counts)
+        # Some people at a time: the curves of all of a long recording at once would take gigabytes.
+        ends = np.flatnonzero(np.diff(np.cumsum(counts) // _TABULATED_AT_ONCE)) + 1
+        blocks = np.split(np.arange(len(counts)), ends)
+        keys, headings, owners = zip(*(self._headings_of(block, counts[block]) for block in blocks), strict=True)
+        self._heading_key, self._heading, owner = np.concatenate(keys), np.concatenate(headings), np.concatenate(owners)
+        people = np.arange(len(counts))
+        self._first_heading = np.searchsorted(owner, people, side="left")
+        self._last_heading = np.searchsorted(owner, people, side="right") - 1
+
+    def _headings_of(
+        self, block: NDArray[np.int64], counts: NDArray[np.int64]
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Rows of some successive people, in the order of the key: key, direction, person."""
+        people = np.repeat(block, counts)
         step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         times = np.minimum(self.start[people] + step * HEADING_TIMESTEP, self.end[people])
         _, velocity = self.position_and_velocity(people, times)
         moving = np.hypot(velocity[:, 0], velocity[:, 1]) >= MOVING_SPEED
-        still = np.setdiff1d(np.arange(len(counts)), people[moving])
+        still = np.setdiff1d(block, people[moving])
         owner = np.concatenate([people[moving], still])
         direction = np.concatenate([np.arctan2(velocity[moving, 1], velocity[moving, 0]), np.zeros(len(still))])
         key = np.concatenate([times[moving], self.start[still]]) - self._origin + owner * self._span
         order = np.argsort(key, kind="stable")
-        self._heading_key, self._heading = key[order], direction[order]
-        people_range = np.arange(len(counts))
-        self._first_heading = np.searchsorted(owner[order], people_range, side="left")
-        self._last_heading = np.searchsorted(owner[order], people_range, side="right") - 1
+        return key[order], direction[order], owner[order]

@@ -3,16 +3,24 @@
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, TextIO, get_args
 
+from socialnav_mj.recordings.fields import FormatError, shown
+from socialnav_mj.recordings.reading import DEFAULT_READING, FRAME_RATES, AxisOrder, Reading
 from socialnav_mj.recordings.recording import Recording
-from socialnav_mj.recordings.samples import FormatError
-from socialnav_mj.recordings.trajnet import read_ndjson, read_text
-from socialnav_mj.recordings.ucy import AxisOrder, read_obsmat, read_vsp
+from socialnav_mj.recordings.tables import layout_of, read_text
+from socialnav_mj.recordings.trajnet import read_ndjson
+from socialnav_mj.recordings.ucy import read_obsmat, read_vsp
 
 Variant = Literal["vsp", "obsmat", "text", "ndjson"]
 DEFAULT_FRAME_RATE = 25.0
 """Of the UCY videos, and so of the frame numbers of every format that does not state its own [Hz]."""
+FORMATS = """one of
+  text:   lines `frame id x y`, or a table with a header that names these columns (else say --columns)
+  obsmat: lines of eight numbers `frame id x z y vx vz vy`
+  ndjson: lines {"track": {"f": frame, "p": id, "x": x, "y": y}}
+  vsp:    a file NAME.vsp, with the homography H.txt beside it"""
+"""What can be read, for messages."""
 
 
 def sha256(paths: Sequence[Path]) -> str:
@@ -30,33 +38,42 @@ def sha256(paths: Sequence[Path]) -> str:
     return digest.hexdigest()
 
 
-def source_files(path: Path, variant: Variant | None) -> tuple[Variant, tuple[Path, ...]]:
+def source_files(
+    path: Path, variant: Variant | None, *, columns: Sequence[str] = ()
+) -> tuple[Variant, tuple[Path, ...]]:
     """Which files make up the recording at a path, and their format.
 
     In a folder, the first that exists is taken: the only `*.vsp` with `H.txt`, `obsmat.txt`, the only `*.ndjson`, the
-    only `*.txt` of four columns. A `.vsp` file needs `H.txt` beside it. Any other file is recognised by its first
-    line: `{` is ndjson, eight numbers are obsmat, four are text.
+    only table among `*.txt` and `*.csv`. A `.vsp` file needs `H.txt` beside it. Any other file is recognised by its
+    first line: `{` is ndjson, eight numbers are obsmat, four numbers or a header with frame, id, x and y are text.
 
     Args:
         path: File or folder.
         variant: The format, if it is to be stated rather than recognised.
+        columns: Of a table, if they are to be stated; see `Reading.columns`.
 
     Returns:
         The format and its files.
 
     Raises:
         FileNotFoundError: If the path or a file it needs does not exist.
-        ValueError: If the format is unknown, or the folder holds several recordings or none.
+        ValueError: If the format is unknown, or the folder holds several recordings.
     """
     if variant is not None and variant not in get_args(Variant):
         raise ValueError(f"unknown variant {variant!r}; available: {', '.join(get_args(Variant))}")
+    if columns:
+        if variant not in (None, "text"):
+            raise ValueError(f"columns = {' '.join(columns)} is not allowed for the variant {variant!r}; allowed: text")
+        variant = "text"
     if path.is_dir():
-        return _files_in_folder(path, variant)
+        return _files_in_folder(path, variant, columns)
     if not path.is_file():
         raise FileNotFoundError(f"no file or folder {path}")
     found = variant or _recognised(path)
     if found is None:
-        raise FormatError(path, None, "not recognised", f"one of the formats {', '.join(get_args(Variant))}")
+        line, text = _first_content(path)
+        given = f"'{shown(text)}' is not recognised" if line else "nothing in it"
+        raise FormatError(path, line or None, given, FORMATS)
     return found, (path, _beside(path, "H.txt")) if found == "vsp" else (path,)
 
 
@@ -65,8 +82,9 @@ def read_recording(
     *,
     name: str,
     variant: Variant,
-    frame_rate: float | None = None,
-    axis_order: AxisOrder = "xy",
+    reading: Reading = DEFAULT_READING,
+    known_rate: float | None = None,
+    known_axis_order: AxisOrder | None = None,
 ) -> Recording:
     """Read a recording.
 
@@ -74,8 +92,9 @@ def read_recording(
         files: As `source_files` returns them.
         name: Of the recording.
         variant: The format.
-        frame_rate: Of the frame numbers; None takes what the file states (ndjson), else `DEFAULT_FRAME_RATE` [Hz].
-        axis_order: What the homography of a vsp takes.
+        reading: What the file does not say.
+        known_rate: Frame rate that the catalogue states; it yields to the reading's, not to the file's [Hz].
+        known_axis_order: What the catalogue says that the homography of a vsp takes; it yields to the reading's.
 
     Returns:
         The recording.
@@ -86,23 +105,38 @@ def read_recording(
     stated: float | None = None
     match variant:
         case "vsp":
+            axis_order = reading.axis_order or known_axis_order or "xy"
             samples = read_vsp(files[0], files[1], axis_order=axis_order)
         case "obsmat":
             samples = read_obsmat(files[0])
         case "text":
-            samples = read_text(files[0])
+            samples, stated = read_text(files[0], reading.columns)
         case "ndjson":
             samples, stated = read_ndjson(files[0])
-    rate = frame_rate or stated or DEFAULT_FRAME_RATE
-    return samples.recording(name=name, variant=variant, frame_rate=rate, checksum=sha256(files))
+    origins = {"given": reading.frame_rate, "catalogue": known_rate, "stated in the file": stated}
+    origins["assumed"] = DEFAULT_FRAME_RATE
+    origin, rate = next((origin, rate) for origin, rate in origins.items() if rate is not None)
+    if not FRAME_RATES[0] <= rate <= FRAME_RATES[1]:
+        expected = f"a frame rate from {FRAME_RATES[0]:g} to {FRAME_RATES[1]:g} Hz"
+        raise FormatError(files[0], None, f"frames come at {rate:g} Hz", expected)
+    return samples.recording(
+        name=name,
+        variant=variant,
+        frame_rate=rate,
+        frame_rate_origin=origin,
+        checksum=sha256(files),
+        reading=reading,
+    )
 
 
-def _files_in_folder(folder: Path, variant: Variant | None) -> tuple[Variant, tuple[Path, ...]]:
+def _files_in_folder(folder: Path, variant: Variant | None, columns: Sequence[str]) -> tuple[Variant, tuple[Path, ...]]:
     candidates: dict[Variant, list[Path]] = {
         "vsp": sorted(folder.glob("*.vsp")),
         "obsmat": sorted(folder.glob("obsmat.txt")),
         "ndjson": sorted(folder.glob("*.ndjson")),
-        "text": [p for p in sorted(folder.glob("*.txt")) if _recognised(p) == "text"],
+        "text": [
+            p for p in sorted([*folder.glob("*.txt"), *folder.glob("*.csv")]) if columns or _recognised(p) == "text"
+        ],
     }
     for kind, files in candidates.items():
         if variant in (None, kind) and files:
@@ -125,14 +159,26 @@ def _recognised(path: Path) -> Variant | None:
     """Format of a file by its name and its first line with content."""
     if path.suffix == ".vsp":
         return "vsp"
-    with path.open(encoding="utf-8", errors="replace") as file:
-        line = next((text for text in (line.partition("#")[0].strip() for line in file) if text), "")
+    _, line = _first_content(path)
     if line.startswith("{"):
         return "ndjson"
+    with _opened(path) as file:
+        if layout_of(file) is not None:
+            return "text"
     fields = line.replace(",", " ").split()
     try:
         [float(text) for text in fields]
     except ValueError:
         return None
-    by_columns: dict[int, Variant] = {8: "obsmat", 4: "text"}
-    return by_columns.get(len(fields))
+    return "obsmat" if len(fields) == 8 else None
+
+
+def _first_content(path: Path) -> tuple[int, str]:
+    """First line that is no remark, counted from 1, without its remark; (0, "") if there is none."""
+    with _opened(path) as file:
+        lines = ((i, line.partition("#")[0].strip()) for i, line in enumerate(file, 1))
+        return next(((i, line) for i, line in lines if line), (0, ""))
+
+
+def _opened(path: Path) -> TextIO:
+    return path.open(encoding="utf-8-sig", errors="replace")

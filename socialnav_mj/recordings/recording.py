@@ -1,13 +1,18 @@
 """A recorded crowd: people as tracks, in metres and seconds."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from socialnav_mj.geometry import Array
 from socialnav_mj.recordings.curves import Curves
+
+LONGEST_NAME = 100
+"""Characters of a recording's name: it goes into tables, files and file names."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,7 +60,7 @@ class Recording:
     """
 
     name: str
-    """Catalogue name, or the stem of the file or folder."""
+    """Catalogue name, or the stem of the file or folder; 1 to `LONGEST_NAME` printable characters."""
     variant: str
     """Which annotation it is: the format it was read from (`vsp`, `obsmat`, `text`, `ndjson`)."""
     frame_rate: float
@@ -68,12 +73,21 @@ class Recording:
     """Per person (k_i, 2) [m]."""
     checksum: str
     """sha256 of the source file; of several files, of their contents one after the other."""
+    frame_rate_origin: str = "given"
+    """Who says the frame rate: it is given, of the catalogue, stated in the file, or assumed."""
+    reading: Mapping[str, Any] = field(default_factory=dict)
+    """Settings that change what is read from the file: see `Reading.settings`."""
 
     def __post_init__(self) -> None:
         """Copy, check and freeze the fields."""
         ids = np.array(self.ids, dtype=np.int64)
         times = tuple(np.array(t, dtype=float) for t in self.times)
         positions = tuple(np.array(x, dtype=float) for x in self.positions)
+        if not (0 < len(self.name) <= LONGEST_NAME and self.name.isprintable()):
+            raise ValueError(
+                f"a recording's name {self.name[: LONGEST_NAME + 1]!a} is not allowed; allowed: "
+                f"1 to {LONGEST_NAME} printable characters"
+            )
         if not self.frame_rate > 0.0:
             raise ValueError(f"recording {self.name!r}: frame_rate = {self.frame_rate!r}; allowed: numbers > 0")
         if ids.ndim != 1 or not len(ids) or (np.diff(ids) <= 0).any():

@@ -1,36 +1,29 @@
 """From the rows of an annotation (frame, person, position) to a `Recording`; what all file formats share."""
 
 import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.geometry import Array
+from socialnav_mj.recordings.fields import FormatError
+from socialnav_mj.recordings.reading import Reading
 from socialnav_mj.recordings.recording import Recording
 
 logger = logging.getLogger(__name__)
 
+Index = NDArray[np.int64]
 Row = tuple[int, int, int, float, float]
-"""Line counted from 1, frame, person, x [m], y [m]."""
+"""Line counted from 1, frame, person, x, y."""
 
-
-class FormatError(ValueError):
-    """A mistake in a recording's file; the message names file, line, what is there and what was expected."""
-
-    def __init__(self, path: Path, line: int | None, given: str, expected: str) -> None:
-        """Compose the message.
-
-        Args:
-            path: The file.
-            line: Counted from 1; None if the mistake is in no single line.
-            given: What the file says.
-            expected: What it should say.
-        """
-        place = f"{path}" if line is None else f"{path}, line {line}"
-        super().__init__(f"{place}: {given}; expected {expected}")
+FARTHEST = 1e7
+"""Largest coordinate; from a pole to the equator, so that map coordinates are allowed [m]."""
+_ROW = [("line", np.int64), ("frame", np.int64), ("person", np.int64), ("x", np.float64), ("y", np.float64)]
+_LISTED = 10
+"""So many ids are named in a warning."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,16 +32,18 @@ class Samples:
 
     path: Path
     """The file the rows come from."""
-    line: NDArray[np.int64]
+    line: Index
     """(k,) line of each row, counted from 1."""
-    frame: NDArray[np.int64]
+    frame: Index
     """(k,)."""
-    person: NDArray[np.int64]
+    person: Index
     """(k,) id."""
     position: Array
-    """(k, 2) [m]."""
+    """(k, 2), in the unit that the reading states."""
 
-    def recording(self, *, name: str, variant: str, frame_rate: float, checksum: str) -> Recording:
+    def recording(
+        self, *, name: str, variant: str, frame_rate: float, frame_rate_origin: str, checksum: str, reading: Reading
+    ) -> Recording:
         """Sort the rows into tracks; the earliest frame of all becomes time 0.
 
         A person with a single row has no motion and cannot be interpolated: it is left out, and a warning with the
@@ -58,53 +53,90 @@ class Samples:
             name: Of the recording.
             variant: Of the recording.
             frame_rate: Frames per second [Hz].
+            frame_rate_origin: Where it comes from.
             checksum: sha256 of the source.
+            reading: Unit of the positions, and the bounds on time.
 
         Returns:
             The recording.
 
         Raises:
-            FormatError: If a person has two rows for one frame, or nobody has two rows.
+            FormatError: If a person has two rows for one frame, nobody has two rows, or a time or a position is
+                beyond its bound.
         """
+        position = self._metres(reading)
+        self._check_duration(frame_rate, reading.max_duration)
         order = np.lexsort((self.frame, self.person))
-        frame, person, line = self.frame[order], self.person[order], self.line[order]
-        twice = np.flatnonzero((np.diff(person) == 0) & (np.diff(frame) == 0))
-        if twice.size:
-            first, second = sorted((int(line[twice[0]]), int(line[twice[0] + 1])))
-            given = (
-                f"person {person[twice[0]]} has a second position at frame {frame[twice[0]]} (the first: line {first})"
-            )
-            raise FormatError(self.path, second, given, "one position per person and frame")
+        frame, person, position = self.frame[order], self.person[order], position[order]
+        self._check_once(frame, person, order)
+        time = (frame - frame.min()) / frame_rate
+        self._check_gaps(time, person, order, reading.max_gap)
         ids, first_row, count = np.unique(person, return_index=True, return_counts=True)
         kept = count >= 2
         if not kept.all():
-            logger.warning(
-                "%s: left out %d people with a single position: ids %s",
-                self.path,
-                np.count_nonzero(~kept),
-                ", ".join(map(str, ids[~kept])),
-            )
+            alone = ids[~kept]
+            listed = ", ".join(map(str, alone[:_LISTED])) + (", ..." if len(alone) > _LISTED else "")
+            logger.warning("%s: left out %d people with a single position: ids %s", self.path, len(alone), listed)
         if not kept.any():
             raise FormatError(self.path, None, f"{len(ids)} people with at most one position", "people with at least 2")
-        time = (frame - frame.min()) / frame_rate
         rows = [slice(start, start + k) for start, k in zip(first_row[kept], count[kept], strict=True)]
         return Recording(
             name=name,
             variant=variant,
             frame_rate=frame_rate,
+            frame_rate_origin=frame_rate_origin,
             ids=ids[kept],
             times=tuple(time[r] for r in rows),
-            positions=tuple(self.position[order][r] for r in rows),
+            positions=tuple(position[r] for r in rows),
             checksum=checksum,
+            reading=reading.settings(),
         )
 
+    def _metres(self, reading: Reading) -> Array:
+        with np.errstate(over="ignore"):
+            position = self.position * reading.unit
+        far = np.flatnonzero(~(np.abs(position) <= FARTHEST).all(axis=1))
+        if far.size:
+            x, y = position[far[0]]
+            given = f"the position ({x:g}, {y:g}) m"
+            raise FormatError(self.path, int(self.line[far[0]]), given, f"coordinates within {FARTHEST:g} m of 0")
+        return position
 
-def samples_of_rows(path: Path, rows: list[Row]) -> Samples:
+    def _check_duration(self, frame_rate: float, longest: float) -> None:
+        duration = int(np.ptp(self.frame)) / frame_rate
+        if duration > longest:
+            # The frame that is far from most others is the one to look at; of two, the later line.
+            far = np.abs(self.frame - int(np.median(self.frame)))
+            row = int(np.flatnonzero(far == far.max())[-1])
+            given = f"frame {self.frame[row]} makes the recording {duration:g} s long at {frame_rate:g} Hz"
+            expected = f"at most {longest:g} s (--max-duration lifts it)"
+            raise FormatError(self.path, int(self.line[row]), given, expected)
+
+    def _check_once(self, frame: Index, person: Index, order: Index) -> None:
+        twice = np.flatnonzero((np.diff(person) == 0) & (np.diff(frame) == 0))
+        if twice.size:
+            row = twice[0]
+            first, second = sorted((int(self.line[order[row]]), int(self.line[order[row + 1]])))
+            given = f"person {person[row]} has a second position at frame {frame[row]} (the first: line {first})"
+            raise FormatError(self.path, second, given, "one position per person and frame")
+
+    def _check_gaps(self, time: Array, person: Index, order: Index, longest: float) -> None:
+        gap = np.where(np.diff(person) == 0, np.diff(time), 0.0)
+        wide = np.flatnonzero(gap > longest)
+        if wide.size:
+            row = wide[0]
+            before, line = int(self.line[order[row]]), int(self.line[order[row + 1]])
+            given = f"person {person[row]} is not seen for {gap[row]:g} s (before: line {before})"
+            expected = f"a gap of at most {longest:g} s (--max-gap lifts it)"
+            raise FormatError(self.path, line, given, expected)
+
+
+def samples_of_rows(path: Path, rows: Iterable[Row]) -> Samples:
     """Columns of rows.
 
     Args:
         path: The file they come from.
-        rows: In the order of the file.
+        rows: In the order of the file; taken one by one, so that a long file costs 40 bytes a row.
 
     Returns:
         The samples.
@@ -112,76 +144,8 @@ def samples_of_rows(path: Path, rows: list[Row]) -> Samples:
     Raises:
         FormatError: If there are none.
     """
-    if not rows:
+    table = np.fromiter(rows, dtype=_ROW)
+    if not len(table):
         raise FormatError(path, None, "no positions", "at least one")
-    line, frame, person, x, y = zip(*rows, strict=True)
-    return Samples(
-        path=path,
-        line=np.array(line),
-        frame=np.array(frame),
-        person=np.array(person),
-        position=np.column_stack([x, y]).astype(float),
-    )
-
-
-def number(text: str, path: Path, line: int, what: str) -> float:
-    """Parse a finite number.
-
-    Args:
-        text: The field.
-        path: The file, for the message.
-        line: Counted from 1, for the message.
-        what: Name of the field, for the message.
-
-    Returns:
-        The number.
-
-    Raises:
-        FormatError: If it is none.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not isfinite(value):
-        raise FormatError(path, line, f"{what} is {text!r}", "a finite number")
-    return value
-
-
-def whole_number(text: str, path: Path, line: int, what: str) -> int:
-    """Parse a whole number, which may be written like 7, 7.0 or 7.0e+00.
-
-    Args:
-        text: The field.
-        path: The file, for the message.
-        line: Counted from 1, for the message.
-        what: Name of the field, for the message.
-
-    Returns:
-        The number.
-
-    Raises:
-        FormatError: If it is none.
-    """
-    value = number(text, path, line, what)
-    if value != int(value):
-        raise FormatError(path, line, f"{what} is {text!r}", "a whole number")
-    return int(value)
-
-
-def text_lines(path: Path) -> list[str]:
-    """Lines of a text file.
-
-    Args:
-        path: The file.
-
-    Returns:
-        The lines without their ends.
-
-    Raises:
-        FormatError: If it is not UTF-8 text.
-    """
-    try:
-        return path.read_text(encoding="utf-8").splitlines()
-    except UnicodeDecodeError as error:
-        raise FormatError(path, None, f"byte {error.start} is not UTF-8", "a text file") from error
+    line, frame, person = (np.ascontiguousarray(table[name]) for name in ("line", "frame", "person"))
+    return Samples(path=path, line=line, frame=frame, person=person, position=np.column_stack([table["x"], table["y"]]))

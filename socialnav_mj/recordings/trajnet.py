@@ -1,36 +1,17 @@
-"""Readers of TrajNet-style text (frame id x y) and of TrajNet++ ndjson (Kothari et al. 2021)."""
+"""Reader of TrajNet++ ndjson (Kothari et al. 2021)."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from socialnav_mj.recordings.samples import FormatError, Row, Samples, number, samples_of_rows, text_lines, whole_number
+from socialnav_mj.recordings.fields import FormatError, number, shown, text_lines, whole_number
+from socialnav_mj.recordings.samples import Row, Samples, samples_of_rows
 
-
-def read_text(path: Path) -> Samples:
-    """Read lines `frame id x y`, separated by spaces, tabs or commas; empty lines and lines after `#` are skipped.
-
-    Args:
-        path: The file.
-
-    Returns:
-        The rows.
-
-    Raises:
-        FormatError: At the first mistake.
-    """
-    rows: list[Row] = []
-    for i, line in enumerate(text_lines(path), 1):
-        values = line.partition("#")[0].replace(",", " ").split()
-        if not values:
-            continue
-        if len(values) != 4:
-            raise FormatError(path, i, f"{len(values)} numbers", "4: frame id x y")
-        frame, person = whole_number(values[0], path, i, "frame"), whole_number(values[1], path, i, "id")
-        rows.append((i, frame, person, number(values[2], path, i, "x"), number(values[3], path, i, "y")))
-    return samples_of_rows(path, rows)
+# Numbers stay text until they are parsed exactly; NaN and Infinity, which Python reads, become text that is refused.
+_DECODER = json.JSONDecoder(parse_int=str, parse_float=str, parse_constant=str)
 
 
 def read_ndjson(path: Path) -> tuple[Samples, float | None]:
@@ -50,38 +31,46 @@ def read_ndjson(path: Path) -> tuple[Samples, float | None]:
     Raises:
         FormatError: At the first mistake, or if scenes state different `fps`.
     """
-    rows: list[Row] = []
-    row_rate: float | None = None
+    stated: list[float] = []
+    samples = samples_of_rows(path, _tracks(path, stated))
+    return samples, stated[0] * _commonest_step(samples) if stated else None
+
+
+def _tracks(path: Path, rates: list[float]) -> Iterator[Row]:
+    """Rows of a file, and into `rates` the `fps` of its scenes."""
     for i, line in enumerate(text_lines(path), 1):
         if not line.strip():
             continue
-        try:
-            entry = json.loads(line)
-        except json.JSONDecodeError as error:
-            raise FormatError(
-                path, i, f"no JSON ({error.msg}, column {error.colno})", "one JSON object a line"
-            ) from None
-        match entry:
-            case {"track": {"prediction_number": int()}}:
+        match _object(path, i, line):
+            case {"track": {"prediction_number": str()}}:
                 raise FormatError(path, i, "a predicted position", "recorded positions only")
-            case {"track": {"f": frame, "p": person, "x": x, "y": y}}:
-                at, who = whole_number(str(frame), path, i, "f"), whole_number(str(person), path, i, "p")
-                rows.append((i, at, who, number(str(x), path, i, "x"), number(str(y), path, i, "y")))
+            case {"track": {"f": str(frame), "p": str(person), "x": str(x), "y": str(y)}}:
+                at, who = whole_number(frame, path, i, "f"), whole_number(person, path, i, "p")
+                yield i, at, who, number(x, path, i, "x"), number(y, path, i, "y")
             case {"track": _}:
-                raise FormatError(path, i, f"track {_short(entry['track'])}", "a track with f, p, x and y")
-            case {"scene": {"fps": fps}}:
-                stated = number(str(fps), path, i, "fps")
-                if stated <= 0.0 or row_rate not in (None, stated):
-                    raise FormatError(
-                        path, i, f"fps is {stated:g}", f"{row_rate or 'a number > 0'}, the same in all scenes"
-                    )
-                row_rate = stated
+                raise FormatError(path, i, shown(line), "a track with the numbers f, p, x and y")
+            case {"scene": {"fps": str(fps)}}:
+                rate = number(fps, path, i, "fps")
+                if rate <= 0.0 or rates not in ([], [rate]):
+                    wanted = f"{rates[0]:g}" if rates else "a number > 0"
+                    raise FormatError(path, i, f"fps is {rate:g}", f"{wanted}, the same in all scenes")
+                rates[:] = [rate]
+            case {"scene": {"fps": _}}:
+                raise FormatError(path, i, shown(line), "a number as fps")
             case {"scene": _}:
                 pass
             case _:
-                raise FormatError(path, i, _short(entry), 'an object with "track" or "scene"')
-    samples = samples_of_rows(path, rows)
-    return samples, None if row_rate is None else row_rate * _commonest_step(samples)
+                raise FormatError(path, i, shown(line), 'an object with "track" or "scene"')
+
+
+def _object(path: Path, line: int, text: str) -> Any:
+    try:
+        return _DECODER.decode(text)
+    except json.JSONDecodeError as error:
+        given = f"no JSON ({error.msg}, column {error.colno})"
+    except RecursionError:
+        given = "JSON that is nested too deeply"
+    raise FormatError(path, line, given, "one JSON object a line")
 
 
 def _commonest_step(samples: Samples) -> int:
@@ -90,8 +79,3 @@ def _commonest_step(samples: Samples) -> int:
     step = np.diff(samples.frame[order])[np.diff(samples.person[order]) == 0]
     values, counts = np.unique(step[step > 0], return_counts=True)
     return int(values[counts.argmax()]) if len(values) else 1
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else text[:57] + "..."

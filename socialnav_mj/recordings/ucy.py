@@ -1,14 +1,15 @@
 """Readers of the UCY formats: `annotation.vsp` with `H.txt`, and `obsmat.txt` (Lerner et al. 2007; Pellegrini 2009)."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from socialnav_mj.geometry import Array
-from socialnav_mj.recordings.samples import FormatError, Row, Samples, number, samples_of_rows, text_lines, whole_number
-
-AxisOrder = Literal["xy", "yx"]
+from socialnav_mj.recordings.fields import FormatError, number, shown, text_lines, whole_number
+from socialnav_mj.recordings.reading import AxisOrder
+from socialnav_mj.recordings.samples import Row, Samples, samples_of_rows
 
 
 def read_homography(path: Path) -> Array:
@@ -31,8 +32,10 @@ def read_homography(path: Path) -> Array:
         raise FormatError(path, None, f"{len(rows)} lines of numbers", "3 lines (a 3x3 homography)")
     matrix = np.array([[number(text, path, i, "homography") for text in fields] for i, fields in rows])
     # Scaling by row keeps the test independent of the unit of the pixels.
-    norms = np.linalg.norm(matrix, axis=1)
-    if not norms.all() or abs(np.linalg.det(matrix / norms[:, None])) < 1e-9:
+    with np.errstate(over="ignore", invalid="ignore"):
+        norms = np.linalg.norm(matrix, axis=1)
+        regular = norms.all() and abs(np.linalg.det(matrix / norms[:, None])) >= 1e-9  # not so if it is NaN
+    if not regular:
         raise FormatError(path, None, "a singular matrix", "an invertible homography")
     return matrix
 
@@ -46,11 +49,12 @@ def apply_homography(matrix: Array, pixels: Array, axis_order: AxisOrder) -> Arr
         axis_order: Whether the homography takes (x, y) or (y, x).
 
     Returns:
-        (k, 2) [m].
+        (k, 2) [m]; not finite for points on the horizon.
     """
     ordered = pixels if axis_order == "xy" else pixels[:, ::-1]
-    mapped = np.column_stack([ordered, np.ones(len(ordered))]) @ matrix.T
-    return mapped[:, :2] / mapped[:, 2:]
+    with np.errstate(all="ignore"):
+        mapped = np.column_stack([ordered, np.ones(len(ordered))]) @ matrix.T
+        return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
 def read_vsp(path: Path, homography: Path, *, axis_order: AxisOrder = "xy") -> Samples:
@@ -73,14 +77,20 @@ def read_vsp(path: Path, homography: Path, *, axis_order: AxisOrder = "xy") -> S
         FormatError: At the first mistake in either file.
     """
     matrix = read_homography(homography)
+    samples = samples_of_rows(path, _control_points(path))
+    return replace(samples, position=apply_homography(matrix, samples.position, axis_order))
+
+
+def _control_points(path: Path) -> Iterator[Row]:
+    """Control points in pixels, spline by spline."""
     lines = text_lines(path)
 
     def fields(index: int, count: int, expected: str) -> list[str]:
         if index >= len(lines):
             raise FormatError(path, len(lines), "the file ends here", expected)
-        found = lines[index].split()[:count]
+        found = lines[index].split(maxsplit=count)[:count]
         if len(found) < count:
-            raise FormatError(path, index + 1, repr(lines[index]), expected)
+            raise FormatError(path, index + 1, f"'{shown(lines[index])}'", expected)
         return found
 
     def a_count(index: int, what: str) -> int:
@@ -90,22 +100,20 @@ def read_vsp(path: Path, homography: Path, *, axis_order: AxisOrder = "xy") -> S
         return value
 
     n_splines = a_count(0, "the number of splines")
-    rows: list[Row] = []
     index = 1
     for person in range(1, n_splines + 1):
         n_points = a_count(index, f"the number of control points of spline {person} of {n_splines}")
+        last = None
         for point in range(1, n_points + 1):
             i = index + point
             x, y, frame, gaze = fields(i, 4, f"x y frame gaze of point {point} of {n_points} of spline {person}")
             number(gaze, path, i + 1, "gaze")
             at = whole_number(frame, path, i + 1, "frame")
-            if point > 1 and at <= rows[-1][1]:
-                raise FormatError(path, i + 1, f"frame {at} after frame {rows[-1][1]}", "frames that increase")
-            rows.append((i + 1, at, person, number(x, path, i + 1, "x"), number(y, path, i + 1, "y")))
+            if last is not None and at <= last:
+                raise FormatError(path, i + 1, f"frame {at} after frame {last}", "frames that increase")
+            last = at
+            yield i + 1, at, person, number(x, path, i + 1, "x"), number(y, path, i + 1, "y")
         index += n_points + 1
-    samples = samples_of_rows(path, rows)
-    position = apply_homography(matrix, samples.position, axis_order)
-    return Samples(path=path, line=samples.line, frame=samples.frame, person=samples.person, position=position)
 
 
 def read_obsmat(path: Path) -> Samples:
@@ -120,7 +128,10 @@ def read_obsmat(path: Path) -> Samples:
     Raises:
         FormatError: At the first mistake.
     """
-    rows: list[Row] = []
+    return samples_of_rows(path, _rows_of_obsmat(path))
+
+
+def _rows_of_obsmat(path: Path) -> Iterator[Row]:
     for i, line in enumerate(text_lines(path), 1):
         values = line.split()
         if not values:
@@ -128,5 +139,4 @@ def read_obsmat(path: Path) -> Samples:
         if len(values) != 8:
             raise FormatError(path, i, f"{len(values)} numbers", "8: frame id x z y vx vz vy")
         frame, person = whole_number(values[0], path, i, "frame"), whole_number(values[1], path, i, "id")
-        rows.append((i, frame, person, number(values[2], path, i, "x"), number(values[4], path, i, "y")))
-    return samples_of_rows(path, rows)
+        yield i, frame, person, number(values[2], path, i, "x"), number(values[4], path, i, "y")

@@ -42,4 +42,6 @@ def window(recording: Recording, begin: float, end: float) -> Recording:
         times=tuple(times),
         positions=tuple(positions),
         checksum=recording.checksum,
+        frame_rate_origin=recording.frame_rate_origin,
+        reading=recording.reading,
     )
