@@ -1,6 +1,7 @@
 """Many episodes: a grid of scenarios, controllers and draws, in parallel, resumable, one file an episode."""
 
 import json
+import logging
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -18,8 +19,11 @@ from socialnav_mj.files import clear_leftovers, write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import recording_metadata
-from socialnav_mj.recordings import Recording, load_recording
+from socialnav_mj.recordings import DEFAULT_READING, Reading, Recording, load_recording
+from socialnav_mj.recordings.plausibility import doubts
 from socialnav_mj.rollout import rollout
+
+logger = logging.getLogger(__name__)
 
 
 class EvaluationError(RuntimeError):
@@ -36,6 +40,8 @@ class Evaluation:
     """Which annotation of the recording; None is the default one."""
     data_dir: str | None = None
     """Where recordings are looked for first."""
+    reading: Reading = DEFAULT_READING
+    """How the recording is read, where it does not say so itself."""
     scenarios: tuple[str, ...] = tasks.ALL_TASKS
     """Names of tasks."""
     controllers: tuple[str, ...] = ("potential_field", "go_straight")
@@ -170,7 +176,9 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
     if n_jobs == 0:
         raise ValueError("n_jobs = 0 is not allowed; allowed: integers >= 1, or -1 for one a core")
     folder = Path(folder)
-    recording = _recording(evaluation.dataset, evaluation.variant, evaluation.data_dir)
+    recording = recording_of(evaluation)
+    for doubt in doubts(recording):
+        logger.warning("%s: %s", evaluation.dataset, doubt)
     jobs = jobs_of(evaluation)
     if len({job.file_name for job in jobs}) < len(jobs):
         raise ValueError(f"controllers {evaluation.controllers} give files of the same name; leave out all but one")
@@ -206,7 +214,7 @@ def _run(job: Job, folder: Path) -> Done:
     """Run one episode in whatever process; a failure is told, so that the others go on."""
     evaluation = job.evaluation
     try:
-        recording = _recording(evaluation.dataset, evaluation.variant, evaluation.data_dir)
+        recording = recording_of(evaluation)
         scenario = _scenario(evaluation, job.scenario, job.draw)
         if job.controller == HUMAN:
             episode = human_episode(recording, scenario, scenario_name=job.scenario)
@@ -221,9 +229,26 @@ def _run(job: Job, folder: Path) -> Done:
     return Done(job=job, simulated_time=float(episode.time[-1]))
 
 
+def recording_of(evaluation: Evaluation) -> Recording:
+    """The recording of an evaluation, read once in each process.
+
+    Args:
+        evaluation: What is to be run.
+
+    Returns:
+        The recording.
+
+    Raises:
+        ValueError: See `load_recording`.
+        FileNotFoundError: See `load_recording`.
+    """
+    return _recording(evaluation.dataset, evaluation.variant, evaluation.data_dir, evaluation.reading)
+
+
 @lru_cache(maxsize=2)
-def _recording(dataset: str, variant: str | None, data_dir: str | None) -> Recording:
-    return load_recording(dataset, variant=variant, data_dir=data_dir)
+def _recording(dataset: str, variant: str | None, data_dir: str | None, reading: Reading) -> Recording:
+    # What looks wrong is told once, before anything runs, and not by every process.
+    return load_recording(dataset, variant=variant, data_dir=data_dir, reading=reading, warn=False)
 
 
 def _scenario(evaluation: Evaluation, name: str, draw: int) -> Scenario:

@@ -63,6 +63,7 @@ def recording_metadata(recording: Recording) -> dict[str, Any]:
         "variant": recording.variant,
         "checksum": recording.checksum,
         "frame_rate": recording.frame_rate,
+        "reading": dict(recording.reading),
     }
 
 

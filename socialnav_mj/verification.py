@@ -19,7 +19,7 @@ from socialnav_mj.episode import Episode
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import package_versions
-from socialnav_mj.recordings import Recording, load_recording
+from socialnav_mj.recordings import DEFAULT_READING, Reading, Recording, load_recording
 from socialnav_mj.recordings.catalogue import catalogue
 from socialnav_mj.report.agents import check_names
 from socialnav_mj.report.run_file import RUN_FILE, read_run_file
@@ -90,6 +90,7 @@ def verify(
     dataset: str | None = None,
     data_dir: str | None = None,
     trust: Trust | None = None,
+    bounds: Reading = DEFAULT_READING,
     n_jobs: int = -1,
 ) -> Iterator[Verdict]:
     """Re-simulate stored episodes and compare all that they say; of a folder, its tables and its count as well.
@@ -99,6 +100,7 @@ def verify(
         dataset: Name or path of the recording; by default the catalogue's of the name that the file gives.
         data_dir: Where recordings are looked for first.
         trust: What the files may name beyond built-in and installed things; nothing by default.
+        bounds: What a recording may hold; the rest of how it is read is each file's.
         n_jobs: Processes; -1 for one a core.
 
     Yields:
@@ -108,25 +110,25 @@ def verify(
         FileNotFoundError: If there is nothing to verify.
     """
     path, trust = Path(path), trust or Trust()
-    arguments = [(file, dataset, data_dir, trust) for file in files_of(path)]
+    arguments = [(file, dataset, data_dir, trust, bounds) for file in files_of(path)]
     yield from in_processes(_verify, arguments, n_jobs=n_jobs)
     if path.is_dir():
         yield _count(path)
         yield from _tables(path, n_jobs)
 
 
-def _verify(path: Path, dataset: str | None, data_dir: str | None, trust: Trust) -> Verdict:
+def _verify(path: Path, dataset: str | None, data_dir: str | None, trust: Trust, bounds: Reading) -> Verdict:
     try:
         if path.suffix == ".rrd":
-            return _verify_trace(path, dataset, data_dir, trust)
-        return _verify_episode(path, dataset, data_dir, trust)
+            return _verify_trace(path, dataset, data_dir, trust, bounds)
+        return _verify_episode(path, dataset, data_dir, trust, bounds)
     except Exception as error:  # noqa: BLE001  whatever a file makes happen, it is told and the others are verified
         return Verdict(path=path, error=f"{type(error).__name__}: {error}")
 
 
-def _verify_episode(path: Path, dataset: str | None, data_dir: str | None, trust: Trust) -> Verdict:
+def _verify_episode(path: Path, dataset: str | None, data_dir: str | None, trust: Trust, bounds: Reading) -> Verdict:
     stored = Episode.load(path)
-    again = resimulate(stored.metadata, dataset=dataset, data_dir=data_dir, trust=trust)
+    again = resimulate(stored.metadata, dataset=dataset, data_dir=data_dir, trust=trust, bounds=bounds)
     return Verdict(
         path=path,
         state_hash=again.metadata["state_hash"],
@@ -135,12 +137,12 @@ def _verify_episode(path: Path, dataset: str | None, data_dir: str | None, trust
     )
 
 
-def _verify_trace(path: Path, dataset: str | None, data_dir: str | None, trust: Trust) -> Verdict:
+def _verify_trace(path: Path, dataset: str | None, data_dir: str | None, trust: Trust, bounds: Reading) -> Verdict:
     from socialnav_mj.trace.columns import differing_columns
     from socialnav_mj.trace.writer import read_metadata, write_trace  # rerun is slow to import
 
     metadata = read_metadata(path)
-    again = resimulate(metadata, dataset=dataset, data_dir=data_dir, trust=trust)
+    again = resimulate(metadata, dataset=dataset, data_dir=data_dir, trust=trust, bounds=bounds)
     differences = _differing_metadata(metadata, again.metadata)
     if not differences:
         # Versions may differ, and are told; the trace shows them.
@@ -235,6 +237,7 @@ def resimulate(
     dataset: str | None = None,
     data_dir: str | None = None,
     trust: Trust | None = None,
+    bounds: Reading = DEFAULT_READING,
 ) -> Episode:
     """Run an episode again from what it says of itself.
 
@@ -243,6 +246,7 @@ def resimulate(
         dataset: Name or path of the recording; by default the catalogue's of the name that the metadata give.
         data_dir: Where recordings are looked for first.
         trust: What the metadata may name beyond built-in and installed things; nothing by default.
+        bounds: What a recording may hold; the rest of how it is read is the metadata's.
 
     Returns:
         The new episode, as long as the stored one.
@@ -261,7 +265,9 @@ def resimulate(
         raise ValueError(
             f"recording {source['name']!r} is not in the catalogue; name the recording's path with --dataset"
         )
-    recording = _recording(dataset or source["name"], source["variant"], data_dir)
+    # Frame rate and settings are the episode's: a recording given by path does not know them.
+    reading = bounds.again(source["frame_rate"], source["reading"])
+    recording = _recording(dataset or source["name"], source["variant"], data_dir, reading)
     if recording.checksum != source["checksum"]:
         raise ValueError(
             f"recording {recording.name!r} has checksum {recording.checksum}, but the episode was run on "
@@ -302,5 +308,5 @@ def _check_length(steps: Any, scenario: Scenario) -> None:
 
 
 @lru_cache(maxsize=2)
-def _recording(dataset: str, variant: str, data_dir: str | None) -> Recording:
-    return load_recording(dataset, variant=variant, data_dir=data_dir)
+def _recording(dataset: str, variant: str, data_dir: str | None, reading: Reading) -> Recording:
+    return load_recording(dataset, variant=variant, data_dir=data_dir, reading=reading, warn=False)

@@ -173,7 +173,13 @@ def build_episode(
             "scenario": scenario.as_dict(),
             "scenario_name": scenario_name,
             "draw": draw,
-            "recording": {"name": "made_up", "variant": "by_hand", "checksum": "0" * 64, "frame_rate": 25.0}
+            "recording": {
+                "name": "made_up",
+                "variant": "by_hand",
+                "checksum": "0" * 64,
+                "frame_rate": 25.0,
+                "reading": {},
+            }
             | (recording or {}),
             "versions": {"socialnav_mj": "0.1.0", "mujoco": "3.17.0"},
             "state_hash": digest.hexdigest(),

@@ -111,6 +111,33 @@ def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(c
     }
 
 
+def test_recording_is_read_as_the_command_says_and_verified_so(tmp_path, capsys):
+    """A table in centimetres at 12.5 Hz, in another order of columns, with a gap of 320 s."""
+    rows = [line.split() for line in Path(TINY).read_text().splitlines() if not line.startswith("#")]
+    lines = [f"{100 * float(x)},{i},{int(f) // 2},{100 * float(y)}" for f, i, x, y in rows]
+    path = tmp_path / "mine.csv"
+    path.write_text("\n".join([*lines, "0,9,0,0", "0,9,4000,0"]))
+    read = ["--frame-rate", "12.5", "--units", "cm", "--columns", "x", "id", "frame", "y"]
+    assert "person 9 is not seen for 320 s" in fails(capsys, *QUICK, "--dataset", str(path), *read)
+    main([*QUICK, "--dataset", str(path), *read, "--max-gap", "400", "--controllers", "go_straight", "--out", "o"])
+    assert "recording mine, variant text: 4 people, 320.0 s, frame rate 12.5 Hz (given)" in capsys.readouterr().err
+    metadata = read_header(next(Path("o/episodes").glob("*.npz")))["metadata"]["recording"]
+    assert metadata["frame_rate"] == 12.5
+    assert metadata["reading"] == {"columns": ["x", "id", "frame", "y"], "units": "cm"}
+    main(["verify", "o", "--dataset", str(path), "--max-gap", "400", "--jobs", "1"])
+    assert "4 of 4 files give the same states again" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["verify", "o", "--dataset", str(path), "--jobs", "1"])
+    assert "--max-gap lifts it" in capsys.readouterr().out
+
+
+def test_evaluate_warns_once_of_a_frame_rate_that_makes_people_run(capfd, caplog):
+    main([*QUICK, "--frame-rate", "100", "--out", "o", "--jobs", "2"])
+    (warning,) = [record.getMessage() for record in caplog.records if "people walk at" in record.getMessage()]
+    assert "probably the frame rate of 100 Hz (given) is wrong" in warning
+    assert "people walk at" not in capfd.readouterr().err  # of the processes that run the episodes
+
+
 def test_settings_of_the_command_reach_the_episodes():
     options = ["--robot-radius", "0.18", "--pedestrian-radius", "0.2", "--turn-limit", "per_second"]
     options += ["--on-collision", "retire", "--control-timestep", "0.1", "--seed", "4", "--out", "o"]
@@ -296,7 +323,8 @@ def test_data_info_shows_the_facts_of_any_recording(capsys):
     output = capsys.readouterr().out
     assert re.search(r"people\s+3\b", output)
     assert "0.25/0.32/0.4 m" in output
-    assert f"variant text, checksum {hashlib.sha256(Path(TINY).read_bytes()).hexdigest()}" in output
+    assert "recording tiny, variant text: 3 people, 7.6 s, frame rate 25 Hz (assumed); --frame-rate sets" in output
+    assert f"checksum {hashlib.sha256(Path(TINY).read_bytes()).hexdigest()}" in output
 
 
 def test_data_fetch_downloads_into_the_folder_that_is_given(capsys, tmp_path, monkeypatch):

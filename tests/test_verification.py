@@ -77,7 +77,7 @@ def alterations(episode: Episode) -> dict[str, dict[str, Any]]:
         "policies": {"policies": ("other",)},
         "controller": {"metadata": {**metadata, "controller": "better"}},
         "scenario_name": {"metadata": {**metadata, "scenario_name": "scenario_5"}},
-        "recording": {"metadata": {**metadata, "recording": {**metadata["recording"], "frame_rate": 1.0}}},
+        "recording": {"metadata": {**metadata, "recording": {**metadata["recording"], "name": "other"}}},
         "state_hash": {"metadata": {**metadata, "state_hash": "0" * 64}},
         "note": {"metadata": {**metadata, "note": "checked"}},
     }

@@ -8,6 +8,8 @@ from rich.table import Table
 
 from socialnav_mj.cli.arguments import Folder, Name
 from socialnav_mj.cli.console import console, errors, say
+from socialnav_mj.cli.recordings import describe
+from socialnav_mj.recordings import DEFAULT_READING, Reading
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +76,7 @@ class DataInfo:
     """Which annotation; the first by default."""
     data_dir: Folder = None
     """Where recordings are looked for first."""
+    reading: Reading = DEFAULT_READING
 
     def run(self) -> None:
         """Print the facts."""
@@ -82,9 +85,9 @@ class DataInfo:
         from socialnav_mj.recordings import load_recording
         from socialnav_mj.recordings.facts import facts, facts_table
 
-        recording = load_recording(self.name, variant=self.variant, data_dir=self.data_dir)
+        recording = load_recording(self.name, variant=self.variant, data_dir=self.data_dir, reading=self.reading)
         console.print(Markdown(facts_table({recording.name: facts(recording)})))
-        say(f"variant {recording.variant}, checksum {recording.checksum}")
+        say(f"{describe(recording)}\nchecksum {recording.checksum}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,9 @@ from rich.table import Table
 
 from socialnav_mj.cli.arguments import Folder, Name, Scenarios
 from socialnav_mj.cli.console import console, counted_progress, errors, follow, say
+from socialnav_mj.cli.recordings import describe
 from socialnav_mj.cli.settings import Settings, changes
+from socialnav_mj.recordings import DEFAULT_READING, Reading
 
 if TYPE_CHECKING:
     from socialnav_mj.verification import Verdict
@@ -30,6 +32,7 @@ class Evaluate:
     """Which annotation of the recording (see `data list`); the first by default."""
     data_dir: Folder = None
     """Where recordings are looked for first; then in $SOCIALNAV_MJ_DATA, then in the user cache."""
+    reading: Reading = DEFAULT_READING
     scenarios: Scenarios = (1, 2, 3, 4)
     """Scenarios that replace 10, 30, 70, 90 % of the people."""
     controllers: tuple[str, ...] = ("potential_field", "go_straight")
@@ -51,13 +54,14 @@ class Evaluate:
         """Evaluate, then report."""
         from socialnav_mj.cli.terminal import show
         from socialnav_mj.controllers import with_policy_of
-        from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
+        from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of, recording_of
         from socialnav_mj.report.writer import write_report
 
         evaluation = Evaluation(
             dataset=self.dataset,
             variant=self.variant,
             data_dir=None if self.data_dir is None else str(self.data_dir),
+            reading=self.reading,
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             controllers=tuple(with_policy_of(spec, self.dataset) for spec in self.controllers),
             draws=self.draws,
@@ -65,6 +69,7 @@ class Evaluate:
             task_kwargs=changes(self.settings),
         )
         out = self.out or Path("runs") / Path(self.dataset).resolve().stem
+        say(describe(recording_of(evaluation)), errors)
         episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)
         follow(episodes, jobs_of(evaluation))
         with errors.status("tables and traces"):
@@ -110,6 +115,10 @@ class Verify:
     controllers and those of installed packages need none."""
     trust_robot: tuple[Path, ...] = ()
     """MJCF files of robots, outside of the package's assets, that the files may name."""
+    max_duration: float = Reading.max_duration
+    """See `evaluate` [s]."""
+    max_gap: float = Reading.max_gap
+    """See `evaluate` [s]."""
     jobs: int = -1
     """Processes; -1 for one a core."""
 
@@ -119,10 +128,13 @@ class Verify:
 
         data_dir = None if self.data_dir is None else str(self.data_dir)
         trust = Trust(controllers=self.trust, robots=self.trust_robot)
+        bounds = Reading(max_duration=self.max_duration, max_gap=self.max_gap)
         checked, wrong = 0, 0
         with counted_progress() as progress:
             bar = progress.add_task("files", total=len(files_of(self.path)))
-            for verdict in verify(self.path, dataset=self.dataset, data_dir=data_dir, trust=trust, n_jobs=self.jobs):
+            for verdict in verify(
+                self.path, dataset=self.dataset, data_dir=data_dir, trust=trust, bounds=bounds, n_jobs=self.jobs
+            ):
                 progress.advance(bar)
                 checked, wrong = checked + 1, wrong + (not verdict.same)
                 say(f"{verdict.path.name}: {_told(verdict)}")
