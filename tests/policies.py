@@ -1,5 +1,6 @@
 """Policy files made by hand."""
 
+import hashlib
 import json
 from itertools import pairwise
 from pathlib import Path
@@ -32,11 +33,21 @@ def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed
         tensors: By name; random ones if not given.
         features: Name of the feature set.
         seed: Of the random ones.
-        card: One that says the features alone if not given.
+        card: Of it, `config` is completed and `sha256` is added.
 
     Returns:
         The path, as `load_policy` takes it.
     """
     save_file(random_tensors(features, seed=seed) if tensors is None else tensors, path)
-    path.with_suffix(".json").write_text(json.dumps(card or {"config": {"features": features}}))
+    card = card or {}
+    config = {
+        "features": features,
+        "seed": seed,
+        "datasets": ["made"],
+        "train_window": [0.0, 0.6],
+        "validation_window": [0.6, 0.7],
+    }
+    config |= card.get("config", {})
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    path.with_suffix(".json").write_text(json.dumps({**card, "config": config, "sha256": sha256}))
     return str(path)

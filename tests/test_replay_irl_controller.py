@@ -15,7 +15,8 @@ from scenes import TINY
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Limits, controller_config, make_controller, with_policy_of
-from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, PolicyError, ReplayIRL, load_policy, shipped_policies
+from socialnav_mj.controllers.policy_card import PolicyError
+from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, ReplayIRL, load_policy, shipped_policies
 from socialnav_mj.environment import make_environment
 from socialnav_mj.features import FEATURE_SETS, running_state, view_of
 from socialnav_mj.rollout import rollout
@@ -149,69 +150,117 @@ def test_missing_policy_is_named_with_what_there_is(tmp_path):
         assert repr(name) in str(caught.value) and all(n in str(caught.value) for n in shipped_policies())
 
 
-def damaged(path: Path, how: str) -> str:
-    """A policy of which something is wrong."""
-    tensors = random_tensors()
-    card = path.with_suffix(".json")
-    if how == "a layer is missing":
-        del tensors["actor.1.weight"]
-    elif how == "a network is missing":
-        tensors = {name: value for name, value in tensors.items() if not name.startswith("reward")}
-    elif how == "hidden widths disagree":
-        tensors["actor.1.weight"] = np.zeros((8, 5), dtype=np.float32)
-    elif how == "a bias has another length":
-        tensors["reward.0.bias"] = np.zeros(3, dtype=np.float32)
-    elif how == "a weight is no matrix":
-        tensors["actor.0.weight"] = np.zeros(8, dtype=np.float32)
-    elif how == "three outputs":
-        tensors |= {"actor.2.weight": np.zeros((3, 8), np.float32), "actor.2.bias": np.zeros(3, np.float32)}
-    elif how == "a weight is not finite":
-        tensors["actor.0.weight"][0, 0] = np.nan
-    name = write_policy(path, tensors=tensors)
-    if how == "truncated weights":
-        path.write_bytes(path.read_bytes()[:-100])
-    elif how == "empty weights":
-        path.write_bytes(b"")
-    elif how == "no card":
-        card.unlink()
-    elif how == "card is no JSON":
-        card.write_text("{")
-    elif how == "card is no dictionary":
-        card.write_text("[1, 2]")
-    elif how == "card is no text":
-        card.write_bytes(b"\xff\xfe\xff")
-    elif how == "unknown features":
-        card.write_text(json.dumps({"config": {"features": "lidar"}}))
-    elif how == "features of another size":
-        card.write_text(json.dumps({"config": {"features": "risk"}}))
-    return name
+def with_tensors(**changes):
+    """Random tensors of which some are others, or missing where None is given."""
+    tensors = {**random_tensors(), **{name.replace("__", "."): value for name, value in changes.items()}}
+    return {name: value for name, value in tensors.items() if value is not None}
+
+
+def first(value, dtype=np.float32):
+    """The actor's first weight with one entry that is another."""
+    weight = random_tensors()["actor.0.weight"].astype(dtype)
+    weight[0, 0] = value
+    return weight
 
 
 @pytest.mark.parametrize(
-    ("how", "message"),
+    ("tensors", "message"),
     [
-        ("a layer is missing", "actor."),
-        ("a network is missing", "reward.0.weight"),
-        ("hidden widths disagree", "actor.1 has weight (8, 5) and bias (8,); expected (n, 8) and (n,)"),
-        ("a bias has another length", "reward.0 has weight (8, 56) and bias (3,)"),
-        ("a weight is no matrix", "actor.0 has weight (8,)"),
-        ("three outputs", "the actor maps 56 to 3 numbers; expected 56 to 2"),
-        ("a weight is not finite", "actor.0 holds values that are not finite"),
-        ("truncated weights", "p.safetensors"),
-        ("empty weights", "p.safetensors"),
-        ("no card", "p.json"),
-        ("card is no JSON", "p.json"),
-        ("card is no dictionary", "p.json"),
-        ("card is no text", "p.json"),
-        ("unknown features", "unknown feature set 'lidar'"),
-        ("features of another size", "expected (n, 82)"),
+        (with_tensors(actor__1__weight=None), "it lacks actor.1.weight"),
+        (with_tensors(actor__1__bias=None), "it lacks actor.1.bias"),
+        (with_tensors(actor__2__weight=None, actor__2__bias=None), "the actor maps 56 to 8 numbers; expected 56 to 2"),
+        ({n: v for n, v in random_tensors().items() if n.startswith("actor")}, "it lacks reward.0.weight"),
+        (with_tensors(critic__0__weight=np.zeros(3)), "it has unknown tensors critic.0.weight"),
+        (with_tensors(actor__4__bias=np.zeros(3)), "it has unknown tensors actor.4.bias"),
+        (
+            with_tensors(actor__1__weight=np.zeros((8, 5), np.float32)),
+            "actor.1 has weight (8, 5) and bias (8,); expected (n, 8) and (n,)",
+        ),
+        (with_tensors(reward__0__bias=np.zeros(3, np.float32)), "reward.0 has weight (8, 56) and bias (3,)"),
+        (with_tensors(actor__0__weight=np.zeros(8, np.float32)), "actor.0 has weight (8,)"),
+        (
+            with_tensors(actor__2__weight=np.zeros((3, 8), np.float32), actor__2__bias=np.zeros(3, np.float32)),
+            "the actor maps 56 to 3 numbers; expected 56 to 2",
+        ),
+        (with_tensors(actor__0__weight=first(np.nan)), "actor.0.weight holds values that are not finite"),
+        (with_tensors(actor__0__weight=first(-np.inf)), "actor.0.weight holds values that are not finite"),
+        (with_tensors(actor__0__weight=first(1e300, float)), "actor.0.weight holds values that are not finite, or too"),
+        (with_tensors(actor__0__weight=np.ones((8, 56), np.int64)), "actor.0.weight holds int64; expected floating"),
     ],
 )
-def test_damaged_policy_is_refused_and_the_file_named(how, message, tmp_path):
-    name = damaged(tmp_path / "p.safetensors", how)
+def test_weights_that_are_no_networks_are_refused_and_the_file_and_the_tensor_named(tensors, message, tmp_path):
+    name = write_policy(tmp_path / "p.safetensors", tensors=tensors)
+    with pytest.raises(PolicyError) as caught:
+        load_policy(name)
+    assert f"{name}: {message}" in str(caught.value)
+
+
+NESTED = "[" * 100_000 + "]" * 100_000
+GIVEN = {"seed": 0, "datasets": ["made"], "train_window": [0.0, 0.6], "validation_window": [0.6, 0.7]}
+
+
+@pytest.mark.parametrize(
+    ("card", "message"),
+    [
+        (None, "p.json: there is no such card"),
+        ("{", "p.json is no readable JSON"),
+        (b"\xff\xfe\xff", "p.json is no readable JSON"),
+        (NESTED, "p.json is no readable JSON"),
+        (f'{{"sha256": {NESTED}}}', "p.json is no readable JSON"),
+        ('{"sha256": ' + "1" * 5000 + "}", "p.json is no readable JSON"),
+        ("[1, 2]", "p.json holds [1, 2]; expected an object"),
+        ({"sha256": None}, "p.json: it lacks sha256"),
+        ({"sha256": 5}, "p.json: sha256 = 5; expected 64 hexadecimal digits"),
+        ({"sha256": "0" * 64}, f"but its card p.json says {'0' * 64}"),
+        ({"config": None}, "p.json: it lacks config"),
+        ({"config": [1]}, "p.json: config = [1]; expected an object"),
+        ({"config": GIVEN}, "p.json: it lacks config.features"),
+        ({"config": {**GIVEN, "features": ["risk"]}}, "p.json: config.features = ['risk']; expected a string"),
+        ({"config": {**GIVEN, "features": "lidar"}}, "p.json: config.features: unknown feature set 'lidar'"),
+        ({"config": {**GIVEN, "features": "risk"}}, "expected (n, 82)"),
+        ({"config": {**GIVEN, "features": "risk", "seed": True}}, "config.seed = True; expected an integer >= 0"),
+        ({"config": {**GIVEN, "features": "risk", "datasets": []}}, "config.datasets = []; expected a list of one"),
+        ({"config": {**GIVEN, "features": "risk", "train_window": [0, 2]}}, "config.train_window = [0, 2]; expected a"),
+    ],
+)
+def test_damaged_card_is_refused_and_the_file_and_the_key_named(card, message, tmp_path):
+    path = tmp_path / "p.json"
+    name = write_policy(tmp_path / "p.safetensors")
+    if isinstance(card, dict):
+        changed = {**json.loads(path.read_text()), **card}
+        card = json.dumps({key: value for key, value in changed.items() if value is not None})
+    if card is None:
+        path.unlink()
+    else:
+        path.write_bytes(card if isinstance(card, bytes) else card.encode())
     with pytest.raises(PolicyError) as caught:
         load_policy(name)
     assert message in str(caught.value) and str(tmp_path / "p") in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_weights_with_any_bit_flipped_or_cut_anywhere_are_refused(tmp_path):
+    path = Path(write_policy(tmp_path / "p.safetensors"))
+    whole, random = path.read_bytes(), np.random.default_rng(0)
+    damaged = [whole[:length] for length in (0, 7, 8, 100, len(whole) - 1)] + [whole + b"\0"]
+    for bit in random.integers(8 * len(whole), size=200):
+        content = bytearray(whole)
+        content[bit // 8] ^= 1 << (bit % 8)
+        damaged.append(bytes(content))
+    for content in damaged:
+        path.write_bytes(content)
+        with pytest.raises(PolicyError, match=r"p\.safetensors has sha256 [0-9a-f]{64}, but its card p\.json says"):
+            load_policy(str(path))
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 7, b"\xff" * 64, b"\x02" + b"\0" * 7 + b"{}"])
+def test_weights_that_are_no_safetensors_are_refused_whatever_the_card_says(content, tmp_path):
+    path = Path(write_policy(tmp_path / "p.safetensors"))
+    path.write_bytes(content)
+    card = json.loads(path.with_suffix(".json").read_text())
+    path.with_suffix(".json").write_text(json.dumps({**card, "sha256": hashlib.sha256(content).hexdigest()}))
+    with pytest.raises(PolicyError, match=r"p\.safetensors"):
+        load_policy(str(path))
 
 
 class Payload:

@@ -7,7 +7,8 @@ import pytest
 from policies import write_policy
 
 from socialnav_mj.cli import main
-from socialnav_mj.controllers.replay_irl import PolicyError, load_policy, shipped_policies
+from socialnav_mj.controllers.policy_card import PolicyError
+from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.learning.shipping import seed_spread, ship
 
 

@@ -1,5 +1,6 @@
 """Policies simple enough to be known by heart: one layer, in the files that trained ones come in."""
 
+import hashlib
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -44,7 +45,8 @@ def write_toy(
         "reward.0.weight": weights,
         "reward.0.bias": np.zeros(1),
     }
-    save_file(tensors, folder / f"{name}.safetensors")
+    path = folder / f"{name}.safetensors"
+    save_file(tensors, path)
     config = {
         "features": "continuous",
         "seed": seed,
@@ -55,6 +57,7 @@ def write_toy(
     }
     seconds = {"sac": 3.0, "reward": 1.0, "all": 10.0}
     entry = {"scene_steps": 7, "success": 0.5, "intrusion_share": 0.25, "training_collided": 0.5, "seconds": seconds}
-    card = {"config": config, "scene_steps": 7, "transitions": 70, "history": [entry]}
-    (folder / f"{name}.json").write_text(json.dumps(card))
-    return str(folder / f"{name}.safetensors")
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    card = {"sha256": sha256, "config": config, "scene_steps": 7, "transitions": 70, "history": [entry]}
+    path.with_suffix(".json").write_text(json.dumps(card))
+    return str(path)

@@ -1,7 +1,6 @@
 """The learned policy (paper section III-A): a trained SAC actor in numpy, without torch."""
 
 import hashlib
-import json
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -9,19 +8,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.numpy import load_file
+from safetensors.numpy import load
 
 from socialnav_mj.controllers.base import Observation, TwistController
-from socialnav_mj.features import FeatureSet, feature_set, running_state, view_of
+from socialnav_mj.controllers.policy_card import PolicyError, read_card
+from socialnav_mj.features import N_FLAGS, FeatureSet, feature_set, running_state, view_of
 from socialnav_mj.geometry import Array
 from socialnav_mj.resources import assets_folder
 
 DEFAULT_POLICY = "plaza_continuous_seed0"
-
-
-class PolicyError(ValueError):
-    """A policy's files are missing, damaged or contradict each other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,53 +138,65 @@ def load_policy(name_or_path: str) -> TrainedPolicy:
         PolicyError: If there is none, or its files are damaged or contradict each other.
     """
     path = policy_path(name_or_path)
-    return _read(path, path.stat().st_mtime_ns)
+    card_path = path.with_suffix(".json")
+    return _read(path, path.stat().st_mtime_ns, card_path.stat().st_mtime_ns if card_path.exists() else 0)
 
 
 @lru_cache(maxsize=32)
-def _read(path: Path, _modified: int) -> TrainedPolicy:
-    """Read a policy once for each state of its file."""
+def _read(path: Path, *_modified: int) -> TrainedPolicy:
+    """Read a policy once for each state of its files."""
+    card_path = path.with_suffix(".json")
+    card, content = read_card(card_path), path.read_bytes()
+    checksum = hashlib.sha256(content).hexdigest()
+    if checksum != card["sha256"]:
+        raise PolicyError(f"{path} has sha256 {checksum}, but its card {card_path.name} says {card['sha256']}")
     try:
-        card = json.loads(path.with_suffix(".json").read_text())
-        tensors = load_file(path)
         features = feature_set(card["config"]["features"])
-        policy = TrainedPolicy(
-            card=card,
-            checksum=hashlib.sha256(path.read_bytes()).hexdigest(),
-            features=features,
-            actor=_layers(tensors, "actor"),
-            reward=_layers(tensors, "reward"),
-        )
-    except (OSError, ValueError, KeyError, TypeError, SafetensorError) as error:
-        raise PolicyError(f"{path} and its card {path.with_suffix('.json').name} are no policy: {error!r}") from error
-    for network, layers, outputs in (("actor", policy.actor, 2), ("reward", policy.reward, 1)):
-        _check(path, network, layers, features.size + 2, outputs)
-    return policy
+    except ValueError as error:
+        raise PolicyError(f"{card_path}: config.features: {error}") from error
+    try:
+        tensors = load(content)
+    except Exception as error:
+        # Which exceptions a file that was made to do harm can provoke here is the library's matter.
+        raise PolicyError(f"{path} is no readable safetensors file: {error!r}") from error
+    inputs = features.size + N_FLAGS
+    networks = {name: _layers(path, tensors, name, inputs, outputs) for name, outputs in (("actor", 2), ("reward", 1))}
+    used = {f"{n}.{i}.{k}" for n, own in networks.items() for i in range(len(own)) for k in ("weight", "bias")}
+    if unknown := sorted({*tensors} - used):
+        raise PolicyError(f"{path}: it has unknown tensors {', '.join(unknown)}")
+    return TrainedPolicy(card=card, checksum=checksum, features=features, **networks)
 
 
-def _check(path: Path, network: str, layers: tuple[tuple[Array, Array], ...], inputs: int, outputs: int) -> None:
-    """Refuse layers that do not follow one another from so many inputs to so many outputs, or hold no numbers."""
+def _layers(
+    path: Path, tensors: dict[str, NDArray[Any]], network: str, inputs: int, outputs: int
+) -> tuple[tuple[Array, Array], ...]:
+    """Layers of a network that follow one another from so many inputs to so many outputs; anything else is refused."""
+    layers: list[tuple[Array, Array]] = []
     width = inputs
-    for i, (weight, bias) in enumerate(layers):
+    while not layers or any(f"{network}.{len(layers)}.{kind}" in tensors for kind in ("weight", "bias")):
+        name = f"{network}.{len(layers)}"
+        weight, bias = _numbers(path, tensors, f"{name}.weight"), _numbers(path, tensors, f"{name}.bias")
         if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
             raise PolicyError(
-                f"{path}: {network}.{i} has weight {weight.shape} and bias {bias.shape}; expected (n, {width}) and (n,)"
+                f"{path}: {name} has weight {weight.shape} and bias {bias.shape}; expected (n, {width}) and (n,)"
             )
-        if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
-            raise PolicyError(f"{path}: {network}.{i} holds values that are not finite")
+        layers.append((weight, bias))
         width = weight.shape[0]
     if width != outputs:
         raise PolicyError(f"{path}: the {network} maps {inputs} to {width} numbers; expected {inputs} to {outputs}")
+    return tuple(layers)
 
 
-def _layers(tensors: dict[str, NDArray[Any]], network: str) -> tuple[tuple[Array, Array], ...]:
-    count = sum(name.startswith(f"{network}.") for name in tensors) // 2
-    if not count:
-        raise KeyError(f"{network}.0.weight")
-    return tuple(
-        (tensors[f"{network}.{i}.weight"].astype(float), tensors[f"{network}.{i}.bias"].astype(float))
-        for i in range(count)
-    )
+def _numbers(path: Path, tensors: dict[str, NDArray[Any]], key: str) -> Array:
+    """A tensor whose values cannot overflow in the forward pass."""
+    if key not in tensors:
+        raise PolicyError(f"{path}: it lacks {key}")
+    if tensors[key].dtype.kind != "f":
+        raise PolicyError(f"{path}: {key} holds {tensors[key].dtype}; expected floating-point numbers")
+    values = tensors[key].astype(float)
+    if not (np.abs(values) <= np.finfo(np.float32).max).all():
+        raise PolicyError(f"{path}: {key} holds values that are not finite, or too large for single precision")
+    return values
 
 
 @dataclass(kw_only=True)

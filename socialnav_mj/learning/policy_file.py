@@ -1,13 +1,14 @@
 """Trained weights as safetensors with a JSON card."""
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
-from safetensors.torch import save_file
+from safetensors.torch import save
 from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
 
-from socialnav_mj.files import write_json, written_whole
+from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.learning.replay_irl import ReplayIRL
 
 
@@ -17,15 +18,15 @@ def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
     Args:
         model: The learner.
         path: Of the .safetensors file; the card is written beside it.
-        card: JSON values.
+        card: JSON values; the weights' sha256 is added.
     """
     actor = model.average.module
     assert isinstance(actor, Actor)
     tensors = _linear_layers("actor", [*actor.latent_pi, actor.mu])
     tensors |= _linear_layers("reward", list(model.reward_net.layers))
-    with written_whole(path) as part:
-        save_file(tensors, part)
-    write_json(path.with_suffix(".json"), card)
+    content = save(tensors)
+    write_whole(path, content)
+    write_json(path.with_suffix(".json"), {**card, "sha256": hashlib.sha256(content).hexdigest()})
 
 
 def _linear_layers(network: str, modules: list[nn.Module]) -> dict[str, Tensor]:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from socialnav_mj.controllers.replay_irl import PolicyError, load_policy
+from socialnav_mj.controllers.policy_card import PolicyError
+from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_json, write_whole
 
 MEASURES = ("success", "intrusion_share", "time_under_way")
