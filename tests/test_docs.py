@@ -1,0 +1,203 @@
+"""README, CONTRIBUTING and docs: code blocks run, commands are parsed, links lead to files, figures are current."""
+
+import csv
+import dataclasses
+import re
+import shlex
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+from house import PAGE, with_figure
+from test_architecture import ROOT
+
+from socialnav_mj import cli
+
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
+RUNS: dict[type, Callable[[Any], None]] = {get_args(kind)[0]: get_args(kind)[0].run for kind in get_args(cli.Command)}
+# What is changed where a command of a page is run: a crowd of three people, one scenario, one process. Others are
+# parsed alone, since they download, train or take minutes; so is `evaluate` without --out, which no later line needs.
+SMALL = {
+    "Evaluate": {"dataset": TINY, "scenarios": (1,), "jobs": 1},
+    "Report": {"jobs": 1},
+    "Verify": {"dataset": TINY, "jobs": 1},
+    "Draws": {},
+    "List": {},
+}
+MOST_DRAWS = 2
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+CODE = re.compile(r"`([^`]+)`")
+LINK = re.compile(r"\]\(([^)#]+)[^)]*\)|src=\"([^\"]+)\"")
+FOLDERS = ("assets/", "data/", "docs/", "results/", "socialnav_mj/", "tasks/", "tests/")
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str, str]]:
+    """Place, language and text of each fenced block."""
+    text = page.read_text(encoding="utf-8")
+    for found in FENCE.finditer(text):
+        yield f"{page.name}:{text[: found.start()].count(chr(10)) + 2}", found[1], found[2]
+
+
+def code_spans(page: Path) -> list[str]:
+    """What stands between single backticks, on one line each."""
+    return [" ".join(span.split()) for span in CODE.findall(FENCE.sub("", page.read_text(encoding="utf-8")))]
+
+
+def lines(text: str) -> Iterator[list[str]]:
+    """Words of every command of a bash block."""
+    for line in text.replace("\\\n", " ").splitlines():
+        if words := shlex.split(line, comments=True):
+            yield words
+
+
+@pytest.fixture
+def parse(monkeypatch):
+    """A function that gives what the command's own parser makes of words, without running it."""
+    seen: list[object] = []
+    for kind in RUNS:
+        monkeypatch.setattr(kind, "run", lambda self: seen.append(self))
+
+    def parsed(words: list[str]) -> object:
+        cli.main(words)
+        return seen.pop()
+
+    return parsed
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder from which modules can be imported; they are forgotten afterwards."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    monkeypatch.setattr(sys, "argv", ["socialnav-mj"])
+    yield tmp_path
+    for name, module in list(sys.modules.items()):
+        if str(getattr(module, "__file__", None)).startswith(str(tmp_path)):
+            del sys.modules[name]
+
+
+def targets_of_make() -> set[str]:
+    return set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def run(words: list[str], parse: Callable[[list[str]], Any]) -> None:
+    """Run a command small, or check what can be checked of it without running it."""
+    program, *arguments = words
+    if program == "socialnav-mj":
+        command = parse(arguments)
+        changes = SMALL.get(type(command).__name__)
+        if changes is not None and getattr(command, "out", Path()) is not None:
+            if hasattr(command, "draws"):
+                changes = changes | {"draws": min(command.draws, MOST_DRAWS)}
+            RUNS[type(command)](dataclasses.replace(command, **changes))
+    elif program == "make":
+        assert set(arguments) <= targets_of_make(), arguments
+    elif program == "rerun":
+        assert all(Path(file).is_file() for file in arguments), f"no {arguments}"
+    else:
+        assert program == ".venv/bin/python", f"{words} is neither run nor checked"
+        assert all((ROOT / word).exists() for word in arguments if "/" in word), arguments
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_code_blocks_run_in_their_order(page, here, parse):
+    """A Python block that begins with a file's name is written to that file; one marked `text` is not run."""
+    names: dict[str, object] = {"__name__": "docs"}
+    for place, language, text in blocks(page):
+        assert language in {"python", "bash", "text"}, f"{place} is marked {language!r}; allowed: python, bash, text"
+        if language == "python" and (file := re.match(r"# (\w+\.py)\n", text)):
+            (here / file[1]).write_text(text, encoding="utf-8")
+        elif language == "python":
+            exec(compile(text, place, "exec", dont_inherit=True), names)
+        elif language == "bash":
+            for words in lines(text):
+                run(words, parse)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_commands_in_the_text_are_parsed(page, parse):
+    for span in code_spans(page):
+        if span.startswith("socialnav-mj ") and span != "socialnav-mj verify":  # named without what it needs
+            parse(shlex.split(span)[1:])
+
+
+def test_the_makefiles_commands_are_parsed(parse):
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    found = re.findall(r"^\t\$\(BIN\)/socialnav-mj (.*)$", makefile, re.MULTILINE)
+    assert found
+    for line in found:
+        parse(shlex.split(line.replace("$(OUT)", "runs/demo")))
+
+
+def test_options_in_the_text_are_those_of_a_command(capsys):
+    named = {span.split()[0]: name for page, name in zip(PAGES, NAMES, strict=True) for span in code_spans(page)}
+    named = {option: page for option, page in named.items() if re.fullmatch(r"--[a-z-]+", option)}
+    known = {"--help"}
+    for words in [
+        [name] for name in ("evaluate", "report", "verify", "draws", "bench", "train", "ship", "reproduce")
+    ] + [
+        ["leave-one-out"],
+        ["data", "list"],
+        ["data", "info"],
+        ["data", "fetch"],
+    ]:
+        with pytest.raises(SystemExit):
+            cli.main([*words, "--help"])
+        known |= set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
+    assert {"--trust", "--seed"} <= set(named) and not {o: p for o, p in named.items() if o not in known}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_links_and_paths_lead_to_files(page):
+    text = page.read_text(encoding="utf-8")
+    links = ["".join(found) for found in LINK.findall(text)]
+    lost = [link for link in links if not link.startswith("http") and not (page.parent / link).exists()]
+    paths = [span for span in code_spans(page) if re.fullmatch(r"[\w./-]+", span) and span.startswith(FOLDERS)]
+    lost += [path for path in paths if "NAME" not in path and not (ROOT / path).exists()]
+    assert not lost
+
+
+def test_the_figure_of_the_house_is_current():
+    page = PAGE.read_text(encoding="utf-8")
+    assert with_figure(page) == page, "draw it anew: python tests/house.py"
+
+
+def test_citation_and_changelog_name_the_packages_version():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {version} - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_readmes_results_are_the_published_ones():
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    folder = ROOT / "results" / "students003"
+    with (folder / "tables" / "levels.csv").open(encoding="utf-8") as file:
+        rows = [
+            r
+            for r in csv.DictReader(file)
+            if (r["variant"], r["training"], r["measure"]) == ("default", "all", "success")
+        ]
+    labels = {
+        "potential_field": "potential field",
+        "replay_irl": "ReplayIRL",
+        "mixed": "hybrid",
+        "human": "the recorded people on their own tracks",
+    }
+    assert {row["method"] for row in rows} == set(labels)
+    for method, label in labels.items():
+        means = [f"{float(row['mean']):.3f}".lstrip("0") for row in rows if row["method"] == method]
+        assert f"{label} {' / '.join(means)}" in text
+    verdicts = Counter(
+        re.findall(r"^\| \(\w+\) \|.*\*\*(\w+)\*\* \|$", (folder / "README.md").read_text(), re.MULTILINE)
+    )
+    assert f"Of {verdicts.total()} claims {verdicts['holds']} hold, {verdicts['fails']} fail and" in text
+    assert f"{verdicts['undecided']} are undecided." in text
+    claims = (folder / "README.md").read_text(encoding="utf-8")
+    assert re.search(r"\| \(a\) \|.*mixed policy has the highest success.*\*\*(undecided|fails)\*\*", claims)
+    assert re.search(r"\| \(b3\) \|.*Potential field agents intrude most.*\*\*holds\*\*", claims)
