@@ -1,4 +1,4 @@
-"""Touches and other events of an episode, told in words."""
+"""Collisions, late spawns and ends of an episode as lines of text."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ def touch_rows(episode: Episode) -> IntArray:
     """Contact rows with each touch once: a touch between two agents stands in two rows of an Episode.
 
     Args:
-        episode: The record.
+        episode: Whose contacts are counted.
 
     Returns:
         Indices of contact rows, ascending; of the two rows the one with the smaller agent index.
@@ -23,11 +23,11 @@ def partner_words(episode: Episode, rows: IntArray) -> list[str]:
     """Kinds of the partners: "person" or "robot".
 
     Args:
-        episode: The record.
+        episode: Whose contacts the rows are.
         rows: (k,) contact rows.
 
     Returns:
-        k words.
+        k words: "person" for a pedestrian, "robot" for an agent.
     """
     kinds = episode.contact_partner_kind[rows]
     return ["person" if kind == Partner.PEDESTRIAN else "robot" for kind in kinds]
@@ -37,7 +37,7 @@ def severities(episode: Episode, rows: IntArray) -> list[str]:
     """Closing speed and peak force, the latter where there was physics.
 
     Args:
-        episode: The record.
+        episode: Whose contacts the rows are.
         rows: (k,) contact rows.
 
     Returns:
@@ -51,13 +51,13 @@ def severities(episode: Episode, rows: IntArray) -> list[str]:
 
 
 def events(episode: Episode) -> list[tuple[float, str, str]]:
-    """The story of an episode: late spawns, touches and ends.
+    """Late spawns, collisions and ends of trips, for the log of a trace.
 
     Args:
-        episode: The record.
+        episode: With robots or, in the human row, people as agents.
 
     Returns:
-        (time [s], level, text), in order of time. Touches have level ERROR, delays and failures WARN, arrivals INFO.
+        (time [s], level, text), in order of time. Collisions have level ERROR, delays and failures WARN, arrivals INFO.
     """
     rows = touch_rows(episode)
     partners = zip(partner_words(episode, rows), partner_person(episode, rows).tolist(), strict=True)

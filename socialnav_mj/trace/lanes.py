@@ -26,13 +26,13 @@ class Change:
 
 
 def first_touch_time(episode: Episode) -> Array:
-    """Time of each agent's first touch.
+    """Time of each agent's first collision.
 
     Args:
-        episode: The record.
+        episode: Whose contacts are searched.
 
     Returns:
-        Shape (n_agents,); inf for agents that touched nobody [s].
+        Shape (n_agents,), seconds since the recording's first frame; inf for agents without a collision [s].
     """
     first = np.full(episode.n_agents, np.inf)
     np.minimum.at(first, episode.contact_agent, episode.contact_time)
@@ -40,11 +40,11 @@ def first_touch_time(episode: Episode) -> Array:
 
 
 def state_changes(episode: Episode, *, linger: float) -> list[list[Change]]:
-    """States of each agent: waiting, driving, collided (from its first touch on), and how it ended.
+    """States of each agent: waiting, driving, collided (from its first collision on), and how its trip ended.
 
     Args:
-        episode: The record.
-        linger: How long the last state stays [s].
+        episode: Whose appearances, spawns, ends and contacts decide the states.
+        linger: How long the last state stays in view after the end of the trip [s].
 
     Returns:
         For each agent its changes in order of time; the last one is empty.
@@ -71,10 +71,10 @@ def state_changes(episode: Episode, *, linger: float) -> list[list[Change]]:
 
 
 def policy_changes(episode: Episode) -> list[list[Change]]:
-    """Policies that acted for each agent.
+    """Policies that acted for each agent, from `Episode.agent_policy`.
 
     Args:
-        episode: The record.
+        episode: Of a controller with one policy or several.
 
     Returns:
         For each agent its changes in order of time; the last one is empty, and agents that never acted have none.

@@ -1,4 +1,4 @@
-"""The part of a trace that lives in space: robots, people, goals, trails and touches."""
+"""The part of a trace that lives in space: robots, people, goals, trails and collisions."""
 
 import numpy as np
 import rerun as rr
@@ -16,10 +16,10 @@ Mask = NDArray[np.bool_]
 
 
 def bounds(episode: Episode) -> tuple[Array, Array]:
-    """Rectangle in which everything happens, with half a metre to spare.
+    """Rectangle around all agents, goals and pedestrians, with a margin of 0.5 m.
 
     Args:
-        episode: The record.
+        episode: With places of agents and pedestrians.
 
     Returns:
         Smallest and largest x and y, shapes (2,) [m].
@@ -34,7 +34,7 @@ def write_scene(episode: Episode, sink: Sink, chosen: IntArray, low: Array, high
     """Write everything that the spatial views show.
 
     Args:
-        episode: The record.
+        episode: Drawn from its first sample to its last.
         sink: The open file.
         chosen: Indices of the agents that are followed closely.
         low: (2,) smallest x and y of `bounds` [m].

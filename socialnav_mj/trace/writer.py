@@ -48,7 +48,7 @@ def write_trace(episode: Episode, path: str | Path) -> Path:
     Two files of one episode mean the same, but differ in bytes: rerun numbers its rows by the clock.
 
     Args:
-        episode: The record; nothing else is needed.
+        episode: All that a trace shows comes from it.
         path: Target, usually ending in .rrd; folders are made.
 
     Returns:
@@ -63,7 +63,7 @@ def chosen_agents(episode: Episode) -> IntArray:
     """Robots to follow closely: the hardest collisions first, then time-outs, then the longest on the way.
 
     Args:
-        episode: The record.
+        episode: Whose contacts, outcomes and times give the order.
 
     Returns:
         At most as many agent indices as there are colours for them; only agents that spawned.
