@@ -54,7 +54,7 @@ def contacts_table(episode: Episode, *, labels: dict[str, Any], file: str = "") 
     """Every collision that counts for its agent, in order of time.
 
     Args:
-        episode: The record.
+        episode: Of robots, or of the recorded people (`human`).
         labels: dataset, variant, scenario, controller, draw.
         file: Name of its file, for the column `episode`.
 

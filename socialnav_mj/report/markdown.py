@@ -1,4 +1,4 @@
-"""Tables in Markdown."""
+"""Rows and tables of Markdown pages."""
 
 import re
 from collections.abc import Sequence
@@ -39,25 +39,25 @@ def code(text: str) -> str:
 
 
 def row(cells: Sequence[str]) -> str:
-    """A row of a table.
+    """One row of a table.
 
     Args:
         cells: Their text, made `plain`.
 
     Returns:
-        One line.
+        One line, without its line break.
     """
     return "| " + " | ".join(plain(cell) for cell in cells) + " |"
 
 
 def head(headings: Sequence[str]) -> list[str]:
-    """What a table begins with.
+    """First two lines of a table: its headings, and the rule that Markdown wants under them.
 
     Args:
         headings: Of the columns.
 
     Returns:
-        Two lines.
+        Two lines of as many cells as there are headings.
     """
     return [row(headings), row(["---"] * len(headings))]
 
@@ -70,7 +70,7 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
         rows: Cells of each row.
 
     Returns:
-        Lines.
+        2 + len(rows) + 1 lines.
     """
     return [*head(headings), *(row(cells) for cells in rows), ""]
 
