@@ -1,18 +1,18 @@
-"""Levels as cells of the tables in Markdown."""
+"""Means and intervals as text of table cells."""
 
 from socialnav_mj.report.markdown import Sign, interval, number
 from socialnav_mj.studies.levels import Level
 
 
 def mean_cell(level: Level | None, digits: int) -> str:
-    """A mean.
+    """A mean with a given number of digits.
 
     Args:
         level: None if there is none.
         digits: Behind the point.
 
     Returns:
-        "-" where there is nothing to tell.
+        Such as "0.681"; "-" if the level is None or its mean NaN.
     """
     return "-" if level is None else number(level.interval.mean, digits)
 

@@ -1,4 +1,4 @@
-"""Means over draws and trainings, and how far they would wander with other draws and other trainings."""
+"""Means over draws and trainings, with bootstrap intervals for other draws and other trainings."""
 
 from dataclasses import dataclass
 

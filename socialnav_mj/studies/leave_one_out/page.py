@@ -32,7 +32,7 @@ an interval that covers 0 leaves it open.
 
 
 def leave_one_out_page(compared: Sequence[SideBySide], *, provenance: Mapping[str, Any]) -> str:
-    """The page.
+    """Text of the study's README.md: differences first, then the levels on each recording.
 
     Args:
         compared: One for each recording.

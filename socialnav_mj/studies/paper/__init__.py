@@ -1,1 +1,1 @@
-"""The paper's experiment: `plan` says what is run, `outputs` makes tables, figures and pages of its episodes."""
+"""The paper's study: `plan` says what is run, `outputs` makes tables, figures and pages of its episodes."""

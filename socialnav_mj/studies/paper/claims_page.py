@@ -1,4 +1,4 @@
-"""claims.md: the verdict on every sentence of the paper, how it came about, and whether it survives the variants."""
+"""claims.md: the verdict on every sentence of the paper, the rule behind it, and the verdicts under other settings."""
 
 from collections.abc import Mapping, Sequence
 from math import isnan
@@ -28,7 +28,7 @@ they were watched.
 
 
 def claims_page(findings: Mapping[str, Sequence[Finding]], *, titles: Mapping[str, str], command: str) -> str:
-    """The page.
+    """Text of claims.md: a table of verdicts, the rule, and a section for each claim with its comparisons.
 
     Args:
         findings: Variant: one finding for each claim; the first is the default setting.

@@ -1,4 +1,4 @@
-"""The paper's figures 1 to 5, and what it leaves out: held-out people, and the choice of the switch distance."""
+"""The paper's figures 1 to 5, and figure 6: the hybrid over its switch distance."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -84,7 +84,7 @@ FIGURES: tuple[Drawing, ...] = (
 
 
 def draw_figures(table: LevelTable, folder: Path) -> list[Path]:
-    """Figures 1 to 5 of the paper.
+    """Draw the paper's figures 1 to 5 from the levels of the default setting.
 
     Args:
         table: Levels of the default setting.
@@ -102,7 +102,7 @@ def draw_figures(table: LevelTable, folder: Path) -> list[Path]:
 
 
 def draw_sweep(sweep: Mapping[float, LevelTable], table: LevelTable, folder: Path) -> list[Path]:
-    """The mixed policy over its switch distance, from the potential field (0) to ReplayIRL (infinity).
+    """Draw figure 6: the hybrid over its switch distance, from the potential field (0) to ReplayIRL (infinity).
 
     Args:
         sweep: Switch distance [m]: levels of that run; the method of interest is `mixed`.

@@ -60,7 +60,7 @@ def experiment_page(
     has_variants: bool,
     provenance: Mapping[str, Any],
 ) -> str:
-    """The page.
+    """Text of the study's README.md.
 
     Args:
         table: Levels of the default setting.

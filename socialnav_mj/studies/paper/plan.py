@@ -1,4 +1,4 @@
-"""The paper's experiment: which controllers run in which settings."""
+"""The paper's study: which controllers run in which settings."""
 
 import re
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What a learned reward thinks of one walker at each place around an agent."""
+"""Figure 7: a learned reward as a function of where, and which way, one walker walks."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How trainings went, by the history in their policies' cards."""
+"""Figure 9: validation success, intrusions and collided runs over each training, from the policies' cards."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Does the picture survive the variants: success of every method in every setting and scenario."""
+"""Figure 8: success of every method in every setting and scenario."""
 
 from collections.abc import Mapping
 from pathlib import Path
