@@ -139,7 +139,7 @@ class TrainingConfig:
             raise ValueError("datasets and shares must not be empty")
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values.
+        """All fields as JSON values.
 
         Returns:
             A dictionary that `from_dict` reads back.

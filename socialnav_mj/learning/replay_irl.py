@@ -241,11 +241,11 @@ class ReplayIRL(SAC):
         }
 
     def restore(self, state: dict[str, Any], buffer: dict[str, NDArray[Any]]) -> None:
-        """Go on from a checkpoint.
+        """Set networks, optimizers, counters, torch's random state and the buffer to a checkpoint's.
 
         Args:
-            state: Of `checkpoint`.
-            buffer: Of `SharedReplayBuffer.state`.
+            state: As `checkpoint` returns it.
+            buffer: As `SharedReplayBuffer.state` returns it.
         """
         assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
         self.policy.load_state_dict(state["policy"])

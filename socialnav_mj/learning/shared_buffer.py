@@ -182,20 +182,20 @@ class SharedReplayBuffer(ReplayBuffer):
         return self.next_observations[index, 0], self.log_probs[index] * np.stack(known, axis=1)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that a checkpoint needs.
+        """The filled part of the buffer, for a checkpoint.
 
         Returns:
-            Arrays for `restore`.
+            Arrays by name, the transitions first, then a cursor of three integers; `restore` takes them.
         """
         size = self.size()
         arrays = {name: getattr(self, name)[:size] for name in (*_ARRAYS, *_OWN_ARRAYS)}
         return {**arrays, "cursor": np.array([self.pos, int(self.full), self._next_run])}
 
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
-        """Fill from a checkpoint; runs that were under way are over.
+        """Fill from a checkpoint; the slots start new runs.
 
         Args:
-            state: Of `state`.
+            state: As `state` returns it.
         """
         for name in (*_ARRAYS, *_OWN_ARRAYS):
             getattr(self, name)[: len(state[name])] = state[name]
