@@ -32,7 +32,7 @@ class EvaluationError(RuntimeError):
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation:
-    """What is to be run."""
+    """A grid of scenarios, controllers and draws on one recording."""
 
     dataset: str = "plaza"
     """Name in the catalogue, or path of a recording."""
@@ -90,7 +90,7 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Done:
-    """What is told of a finished job."""
+    """Outcome of a job: run, found in the folder, or failed."""
 
     job: Job
     simulated_time: float | None = None
@@ -113,10 +113,10 @@ class Pace:
         self._finished = self._simulated = 0.0
 
     def note(self, done: Done) -> None:
-        """Account for one job.
+        """Take a job's cost from what is waiting; if it was run, add its cost and simulated time.
 
         Args:
-            done: Of `evaluate`.
+            done: As `evaluate` yields it.
         """
         self._waiting -= done.job.cost
         if done.simulated_time is not None:

@@ -1,4 +1,4 @@
-"""The recorded people scored as if they were the agents: the ceiling, and the honest comparison."""
+"""Episodes in which the replaced people take the place of the agents, on their own recorded tracks: the human row."""
 
 from dataclasses import dataclass
 
