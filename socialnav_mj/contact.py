@@ -34,6 +34,7 @@ class Contact:
     partner_velocity: Array
     impulse: float
     peak_force: float
+    squeeze: float
 
     def seen_by_partner(self, heading: float) -> "Contact":
         """The same touch from the other agent's side.

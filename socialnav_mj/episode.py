@@ -21,7 +21,7 @@ __all__ = ["Array", "Episode", "EpisodeError", "IntArray", "Outcome", "Partner",
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-FORMAT = "socialnav_mj.episode/2"
+FORMAT = "socialnav_mj.episode/3"
 MAX_BYTES = 1 << 30
 """An episode file whose arrays are larger is not read: a small file can ask for any amount of memory."""
 
@@ -51,7 +51,7 @@ class Episode:
     agent_deadline: Array
     """(n,) counted from the real spawn; NaN if there was none [s]."""
     agent_end_time: Array
-    """(n,) sample at which it arrived, timed out or was stopped; NaN if never spawned [s]."""
+    """(n,) sample at which its run ended, however it did; NaN if never spawned [s]."""
     agent_outcome: IntArray
     """(n,) values of `Outcome`."""
 
@@ -63,6 +63,8 @@ class Episode:
     """(t, n, 2) [m/s]."""
     agent_yaw_rate: Array
     """(t, n) [rad/s]."""
+    agent_tilt: Array
+    """(t, n) angle between the robot's upward axis and the vertical; 0 in the human row [rad]."""
     agent_wheel_speed: Array
     """(t, n, 2) (left, right) command that acts from this sample on; NaN at the end's sample [rad/s]."""
     agent_policy: IntArray
@@ -101,6 +103,9 @@ class Episode:
     """(k,) integral of the normal force over the touch; NaN where there is no physics (human row) [N s]."""
     contact_peak_force: Array
     """(k,) largest normal force of one physics step; NaN where there is no physics [N]."""
+    contact_squeeze: Array
+    """(k,) largest force by which either robot of the touch was squeezed while it lasted: half of what the normal
+    forces on it have in sum more than their resultant, which moves it; NaN where there is no physics [N]."""
 
     policies: tuple[str, ...]
     """Names that `agent_policy` indexes; the controller's name alone if it never switches."""

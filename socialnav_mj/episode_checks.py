@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.contact import INTEGER_COLUMNS, PLANAR_COLUMNS, Partner
-from socialnav_mj.outcome import Outcome
+from socialnav_mj.outcome import OVERTURNED_TILT, Outcome
 
 if TYPE_CHECKING:
     from socialnav_mj.episode import Episode
@@ -27,6 +27,7 @@ _PER_STEP = {
     "agent_heading",
     "agent_velocity",
     "agent_yaw_rate",
+    "agent_tilt",
     "agent_wheel_speed",
     "agent_policy",
     "pedestrian_position",
@@ -135,12 +136,16 @@ def _check_presence(episode: "Episode") -> None:
         raise EpisodeError("agent_end_time must not be before agent_spawn_time")
     time = episode.time[:, None]
     after, before = time >= episode.agent_spawn_time - _SAME_TIME, time <= episode.agent_end_time + _SAME_TIME
-    for name in ("agent_position", "agent_heading", "agent_velocity", "agent_yaw_rate"):
+    for name in ("agent_position", "agent_heading", "agent_velocity", "agent_yaw_rate", "agent_tilt"):
         if not _is_finite_where(getattr(episode, name), after & before):
             raise EpisodeError(f"{name} must be finite from spawn to end, and NaN elsewhere")
     under_way = after & (time < episode.agent_end_time - _SAME_TIME)
     if not np.array_equal(episode.agent_policy >= 0, under_way):
         raise EpisodeError("agent_policy must be -1 except from the spawn up to, not including, the end")
+    lies = episode.agent_tilt > OVERTURNED_TILT
+    at_end = after & before & ~under_way
+    if not np.array_equal(lies, at_end & (episode.agent_outcome == Outcome.OVERTURNED)):
+        raise EpisodeError("agent_tilt must exceed the limit at the end of overturned agents, and nowhere else")
     there = np.isfinite(episode.pedestrian_heading)
     for name in ("pedestrian_position", "pedestrian_velocity"):
         if not _is_finite_where(getattr(episode, name), there):

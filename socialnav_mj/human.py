@@ -80,6 +80,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
         agent_heading=heading,
         agent_velocity=velocity,
         agent_yaw_rate=np.where(np.isnan(heading), np.nan, _yaw_rate(heading, dt)),
+        agent_tilt=np.where(np.isnan(heading), np.nan, 0.0),
         agent_wheel_speed=np.full((steps, n, 2), np.nan),
         agent_policy=np.where(under_way, 0, -1),
         pedestrian_person=cast.pedestrian_person.copy(),
@@ -154,6 +155,7 @@ def _contacts(recording: Recording, scenario: Scenario, people: list[_Person], p
                     partner_velocity=other_velocity,
                     impulse=np.nan,
                     peak_force=np.nan,
+                    squeeze=np.nan,
                 )
                 for agent, other, direction, heading, own_velocity, other_velocity in sides
                 if agent.kind == Partner.AGENT

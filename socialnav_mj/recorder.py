@@ -23,7 +23,7 @@ class Recorder:
             task: Is looked at whenever something is noted; it has to be reset before the first sample.
         """
         self._task = task
-        self._samples: list[tuple[IntArray, Array, Array, Array, Array]] = []
+        self._samples: list[tuple[IntArray, Array, Array, Array, Array, Array]] = []
         self._actions: list[tuple[IntArray, Array, IntArray]] = []
 
     def note_sample(self) -> None:
@@ -37,6 +37,7 @@ class Recorder:
                 sample.heading[slots],
                 sample.velocity[slots],
                 sample.yaw_rate[slots],
+                sample.tilt[slots],
             )
         )
 
@@ -64,10 +65,10 @@ class Recorder:
         task, cast, dt = self._task, self._task.cast, self._task.scenario.control_timestep
         t, n = len(self._samples), cast.n_agents
         position, velocity = np.full((t, n, 2), np.nan), np.full((t, n, 2), np.nan)
-        heading, yaw_rate = np.full((t, n), np.nan), np.full((t, n), np.nan)
+        heading, yaw_rate, tilt = (np.full((t, n), np.nan) for _ in range(3))
         wheel_speed, policy = np.full((t, n, 2), np.nan), np.full((t, n), -1, dtype=np.int64)
         for k, (agent, *values) in enumerate(self._samples):
-            position[k, agent], heading[k, agent], velocity[k, agent], yaw_rate[k, agent] = values
+            position[k, agent], heading[k, agent], velocity[k, agent], yaw_rate[k, agent], tilt[k, agent] = values
         for k, (agent, action, chosen) in enumerate(self._actions):
             wheel_speed[k, agent], policy[k, agent] = action, chosen
         spawned = task.spawn_step >= 0
@@ -89,6 +90,7 @@ class Recorder:
             agent_heading=heading,
             agent_velocity=velocity,
             agent_yaw_rate=yaw_rate,
+            agent_tilt=tilt,
             agent_wheel_speed=wheel_speed,
             agent_policy=policy,
             **_pedestrian_series(task.recording, cast, time, dt),
@@ -116,6 +118,7 @@ class Recorder:
                 partner_velocity=touch.partner_velocity,
                 impulse=touch.impulse,
                 peak_force=touch.peak_force,
+                squeeze=touch.squeeze,
             )
             contacts.append(contact)
             if touch.kind == Partner.AGENT:

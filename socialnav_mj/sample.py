@@ -24,6 +24,8 @@ class Sample:
     """(n_slots, 2) [m/s]."""
     yaw_rate: Array
     """(n_slots,) [rad/s]."""
+    tilt: Array
+    """(n_slots,) angle between the robot's upward axis and the vertical [rad]."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -46,6 +48,7 @@ class Sample:
             heading=physics.agent_heading(),
             velocity=physics.agent_velocity(),
             yaw_rate=physics.agent_yaw_rate(),
+            tilt=physics.agent_tilt(),
         )
 
     @classmethod
@@ -64,6 +67,7 @@ class Sample:
             heading=np.zeros(n_slots),
             velocity=np.zeros((n_slots, 2)),
             yaw_rate=np.zeros(n_slots),
+            tilt=np.zeros(n_slots),
         )
 
     def updated(self, other: "Sample", slots: IntArray) -> "Sample":

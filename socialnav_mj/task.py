@@ -14,6 +14,7 @@ from socialnav_mj.entrance import AgentQueue, Ghosts, is_free
 from socialnav_mj.episode import IntArray, Outcome
 from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
 from socialnav_mj.observation import observe
+from socialnav_mj.outcome import OVERTURNED_TILT
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording
 from socialnav_mj.sample import Sample
@@ -280,14 +281,20 @@ class CrowdTask(base.Task):
         self._goal_distance[slots] = distance
         arrived = distance <= self.scenario.goal_radius
         late = self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]
+        overturned = self._sample.tilt[slots] > OVERTURNED_TILT
         taken_out = np.isin(slots, struck if self.scenario.on_collision == "retire" else [])
-        self._reward[slots[arrived & ~taken_out]] += ARRIVAL_REWARD
-        for row in np.flatnonzero(taken_out | arrived | late):
+        # What comes first here ends the run if several do in one step; it stays under way if none does.
+        ways = {
+            Outcome.OVERTURNED: overturned,
+            Outcome.COLLIDED: taken_out,
+            Outcome.ARRIVED: arrived,
+            Outcome.TIMED_OUT: late,
+        }
+        outcome = np.select(list(ways.values()), list(ways), _UNDER_WAY)
+        self._reward[slots[outcome == Outcome.ARRIVED]] += ARRIVAL_REWARD
+        for row in np.flatnonzero(outcome != _UNDER_WAY):
             slot, agent = int(slots[row]), int(agents[row])
-            if taken_out[row]:
-                self.outcome[agent] = Outcome.COLLIDED
-            else:
-                self.outcome[agent] = Outcome.ARRIVED if arrived[row] else Outcome.TIMED_OUT
+            self.outcome[agent] = outcome[row]
             self.end_step[agent] = self.step
             self._slot_agent[slot] = NOBODY
             physics.park_agent(slot)

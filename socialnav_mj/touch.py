@@ -40,6 +40,20 @@ class Touch:
     """Integral of the normal force so far [N s]."""
     peak_force: float = 0.0
     """Largest normal force so far [N]."""
+    squeeze: float = 0.0
+    """Largest force so far by which either robot of the touch was squeezed, see `squeeze_force` [N]."""
+
+
+def squeeze_force(forces: Array) -> float:
+    """How much of the forces on a body only presses it together: (sum |f_i| - |sum f_i|) / 2.
+
+    Args:
+        forces: Shape (k, 3) [N].
+
+    Returns:
+        0 for forces in one direction, F for two of size F that oppose each other [N].
+    """
+    return 0.5 * float(np.linalg.norm(forces, axis=1).sum() - np.linalg.norm(forces.sum(axis=0)))
 
 
 class TouchLog:
@@ -110,16 +124,19 @@ class TouchLog:
         pairs = self._index.owner[data.contact.geom]
         timestep = model.opt.timestep
         forces: dict[tuple[int, int], float] = {}
+        pushes: dict[tuple[int, int], Array] = {}
         for i in np.flatnonzero(pairs.min(axis=1) >= 0):
             pair = (int(min(pairs[i])), int(max(pairs[i])))
             mujoco.mj_contactForce(model, data, int(i), self._wrench)
+            flip = pairs[i, 0] != pair[0]
             forces[pair] = forces.get(pair, 0.0) + float(self._wrench[0])
+            pushes[pair] = pushes.get(pair, 0.0) + data.contact.frame[i, :3] * (
+                self._wrench[0] * (-1.0 if flip else 1.0)
+            )
             touch = self._open.get(pair)
             # The gap is between the last step's end and this one's beginning.
             if touch is None or time - touch.last_time - timestep >= self._rearm_time - 1e-9:
-                touch = self._begin(
-                    data, pair, int(i), time, flip=pairs[i, 0] != pair[0], before=velocity_before, walking=walking
-                )
+                touch = self._begin(data, pair, int(i), time, flip=flip, before=velocity_before, walking=walking)
                 self._open[pair] = touch
                 self._new.append(touch)
             touch.last_time = time
@@ -127,6 +144,24 @@ class TouchLog:
             touch = self._open[pair]
             touch.impulse += force * timestep
             touch.peak_force = max(touch.peak_force, force)
+        if len(pushes) > 1:
+            self._note_squeeze(pushes)
+
+    def _note_squeeze(self, pushes: dict[tuple[int, int], Array]) -> None:
+        """Let every touch know by how much its robots are squeezed.
+
+        Args:
+            pushes: Normal force of each pair on its second body [N].
+        """
+        felt: dict[int, list[Array]] = {}
+        for (agent, other), push in pushes.items():
+            felt.setdefault(agent, []).append(-push)
+            if other < self._index.n_agents:
+                felt.setdefault(other, []).append(push)
+        squeeze = {body: squeeze_force(np.array(forces)) for body, forces in felt.items() if len(forces) > 1}
+        for pair in pushes:
+            touch = self._open[pair]
+            touch.squeeze = max(touch.squeeze, *(squeeze.get(body, 0.0) for body in pair))
 
     def _begin(
         self,

@@ -77,6 +77,8 @@ class Touch:
     """[N s]."""
     peak_force: float = 20.0
     """[N]."""
+    squeeze: float = 0.0
+    """[N]."""
 
 
 def build_episode(
@@ -136,6 +138,10 @@ def build_episode(
             twist[active, i], wheel_radius=robot.wheel_radius, track=robot.track
         )
         policy[active, i] = agents[i].policy
+    tilt = np.where(np.isnan(body["heading"]), np.nan, 0.0)
+    for i, agent in enumerate(agents):
+        if agent.outcome is Outcome.OVERTURNED:
+            tilt[last[i], i] = np.pi
     goal = np.array([tr[-1] if a.goal is None else a.goal for a, tr in zip(agents, tracks, strict=True)], dtype=float)
     start = np.array([track[0] for track in tracks], dtype=float)
     goal, start = goal.reshape(n, 2), start.reshape(n, 2)
@@ -159,6 +165,7 @@ def build_episode(
         agent_end_time=np.where(spawned, start_time + step * last, np.nan),
         agent_outcome=np.array([a.outcome for a in agents], dtype=np.int64),
         **{f"agent_{name}": value for name, value in body.items()},
+        agent_tilt=tilt,
         agent_wheel_speed=wheel_speed,
         agent_policy=policy,
         pedestrian_person=np.array(
@@ -241,4 +248,5 @@ def _contacts(
         ).reshape(k, 2),
         "contact_impulse": np.array([touch.impulse for touch, *_ in rows], dtype=float),
         "contact_peak_force": np.array([touch.peak_force for touch, *_ in rows], dtype=float),
+        "contact_squeeze": np.array([touch.squeeze for touch, *_ in rows], dtype=float),
     }

@@ -21,6 +21,7 @@ TOUCH = Contact(
     partner_velocity=np.array([0.0, -0.5]),
     impulse=3.0,
     peak_force=90.0,
+    squeeze=12.0,
 )
 
 
@@ -30,7 +31,7 @@ def test_other_side_of_a_touch_exchanges_the_parties_and_keeps_what_they_share()
     np.testing.assert_array_equal(other.normal, [-0.6, -0.8])
     np.testing.assert_array_equal(other.agent_velocity, TOUCH.partner_velocity)
     np.testing.assert_array_equal(other.partner_velocity, TOUCH.agent_velocity)
-    for name in ("time", "duration", "position", "impulse", "peak_force"):
+    for name in ("time", "duration", "position", "impulse", "peak_force", "squeeze"):
         assert getattr(other, name) is getattr(TOUCH, name)
     with pytest.raises(FrozenInstanceError):
         other.time = 0.0

@@ -124,6 +124,14 @@ def test_contact_during_another_is_clamped_and_its_force_not_told():
     assert [metrics.collisions_by_severity(episode, what)[0] for what in Severity] == [1, 0, 0, 2]
 
 
+def test_contact_of_a_robot_squeezed_by_more_than_mass_and_drive_explain_is_wedged():
+    agent, people = Agent(positions=np.zeros((21, 2)), goal=(3, 0)), [Pedestrian(positions=np.tile((0.3, 0), (21, 1)))]
+    touches = [Touch(agent=0, partner=0, step=k, squeeze=s) for k, s in ((3, 600.0), (6, 600.1), (9, math.nan))]
+    episode = build_episode([agent], people, touches)
+    assert severity.wedged(episode).tolist() == [False, True, False]
+    assert metrics.wedged_collisions(episode).tolist() == [1]
+
+
 def test_human_row_has_no_force_and_no_severity():
     episode = meeting(0.0, -1.0, peak_force=math.nan, impulse=math.nan)
     assert np.isnan(metrics.collisions_by_severity(episode, Severity.OVER)).all()

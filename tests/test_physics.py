@@ -5,6 +5,7 @@ import pickle
 from math import ceil
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from dm_control.rl.control import PhysicsError
@@ -15,11 +16,13 @@ from socialnav_mj.config import Robot, Scenario
 from socialnav_mj.controllers import GoStraight, Limits
 from socialnav_mj.episode import Partner
 from socialnav_mj.geometry import Array, quaternion_of_yaw
+from socialnav_mj.metrics.severity import WEDGE_FORCE
+from socialnav_mj.outcome import OVERTURNED_TILT
 from socialnav_mj.physics import Physics
 from socialnav_mj.resources import assets_folder
 from socialnav_mj.rollout import rollout
 from socialnav_mj.scene import build_model
-from socialnav_mj.touch import Touch
+from socialnav_mj.touch import Touch, squeeze_force
 
 TIMESTEP = 0.01  # [s]
 CONTACT_DISTANCE = 0.17 + 0.15  # [m]
@@ -139,6 +142,59 @@ def test_touch_counts_again_only_after_the_rearm_time_apart(apart: int, count: i
     else:
         assert touches[0].last_time == pytest.approx(0.07)
         assert touches[1].time == pytest.approx((3 + 5 + apart) * TIMESTEP)
+
+
+def squeeze_of(physics: Physics, *places: Array) -> float:
+    """Largest squeeze of any touch while people are led along places, each of shape (k, 2), and k steps more."""
+    path = np.stack(places, axis=1)
+    path = np.concatenate([path, np.repeat(path[-1:], len(path), axis=0)])
+    physics.set_pedestrian_path(path, np.zeros_like(path))
+    physics.step(len(path))
+    return max((touch.squeeze for touch in physics.new_touches()), default=0.0)
+
+
+def approach(start: float, end: float, steps: int = 60) -> Array:
+    """Positions along the x axis at constant speed, shape (steps, 2) [m]."""
+    return np.stack([np.linspace(start, end, steps), np.zeros(steps)], axis=-1)
+
+
+def test_robot_that_one_person_shoves_is_not_squeezed_and_between_two_it_is_wedged() -> None:
+    aside = np.tile(AWAY, (60, 1))
+    assert squeeze_of(physics_of(n_pedestrians=2), approach(0.8, 0.1), aside) == 0.0
+    # 0.54 m between two people whose bodies and the robot's take 0.64 m.
+    assert squeeze_of(physics_of(n_pedestrians=2), approach(0.8, 0.27), approach(-0.8, -0.27)) > 10.0 * WEDGE_FORCE
+
+
+def test_robot_pushed_into_a_robot_is_squeezed_by_no_more_than_mass_and_grip_explain() -> None:
+    physics = physics_of(n_agents=2)
+    physics.place_agent(1, np.array([-0.4, 0.0]), 0.0)
+    squeeze = squeeze_of(physics, approach(0.8, 0.1))
+    assert 10.0 < squeeze < WEDGE_FORCE  # the grip of the second robot's wheels alone is up to 63 N
+
+
+def test_squeeze_is_what_cancels() -> None:
+    east, north = np.array([3.0, 0.0, 0.0]), np.array([0.0, 4.0, 0.0])
+    assert squeeze_force(np.stack([east, 2.0 * east])) == 0.0
+    assert squeeze_force(np.stack([east, -east])) == pytest.approx(3.0)
+    assert squeeze_force(np.stack([2.0 * east, -east])) == pytest.approx(3.0)
+    assert squeeze_force(np.stack([east, north])) == pytest.approx(0.5 * (3.0 + 4.0 - 5.0))
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.25 * np.pi, 0.5 * np.pi, 0.75 * np.pi, np.pi, 1.5 * np.pi])
+def test_robot_that_is_let_go_at_a_tilt_rights_itself_or_ends_beyond_the_limit(direction: float) -> None:
+    # The wheels are spheres of 0.06 m 0.12 m beside the middle, the casters of 0.02 m ahead and behind.
+    centres = np.array([[0.0, 0.12, 0.06], [0.0, -0.12, 0.06], [0.12, 0.0, 0.02], [-0.12, 0.0, 0.02]])
+    radii = np.array([0.06, 0.06, 0.02, 0.02])
+    for tilt, falls in ((60.0, False), (85.0, True)):
+        physics, half = physics_of(), 0.5 * np.radians(tilt)
+        turn = np.array([np.cos(half), np.sin(half) * np.cos(direction), np.sin(half) * np.sin(direction), 0.0])
+        matrix = np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, turn)
+        physics.data.qpos[2] = -((centres @ matrix.reshape(3, 3).T)[:, 2] - radii).min()
+        physics.data.qpos[3:7], physics.data.qvel[:] = turn, 0.0
+        physics.step(200)
+        assert (physics.agent_tilt()[0] > OVERTURNED_TILT) is np.bool_(falls)
+        assert falls or physics.agent_tilt()[0] < 0.01
 
 
 def test_normal_points_from_the_agent_whatever_order_mujoco_names_the_bodies_in(tmp_path: Path) -> None:

@@ -168,6 +168,28 @@ def test_episode_that_is_cut_says_who_was_under_way_and_who_never_came():
     assert episode.agent_policy[-1].tolist() == [-1, -1] and len(episode.time) == 11
 
 
+def test_robot_that_lies_on_its_back_ends_its_run_overturned_and_leaves_the_scene():
+    """Turned over by force at 1 s: it fails, is taken out at the next step, and the other one drives on."""
+    walks = (walk([(0, 0), (9, 0)], 1.0), walk([(0, 3), (9, 3)], 1.0), stand((19, 19), 0, 20))
+    environment = environment_of(*walks, agents=[1, 2])
+
+    class Vandal(GoStraight):
+        def act(self, observation):
+            task, data = environment.task, environment.physics.data
+            if task.step == 5:
+                data.qpos[2:7] = [0.12, 0.0, 1.0, 0.0, 0.0]  # half a turn about its x axis, on its wheels
+            return super().act(observation)
+
+    episode = rollout(environment, Vandal())
+    assert episode.agent_outcome.tolist() == [Outcome.OVERTURNED, Outcome.ARRIVED]
+    assert episode.agent_end_time[0] == pytest.approx(1.2)
+    assert episode.agent_tilt[6, 0] > 2.4 and np.nanmax(episode.agent_tilt[:6, 0]) < 0.1
+    assert np.isnan(episode.agent_tilt[7:, 0]).all() and np.nanmax(episode.agent_tilt[:, 1]) < 0.1
+    values = per_agent(episode)
+    assert values["overturned"].tolist() == [True, False] and values["success"].tolist() == [False, True]
+    assert values["maximum_tilt"][0] > 2.4 and values["completion_censored"].tolist() == [True, False]
+
+
 def test_touch_of_a_standing_person_is_recorded_with_its_physics():
     """A person of radius 0.15 m stands in the way at 3 m: the bodies meet at 2.85 m, at full speed."""
     episode = rollout(environment_of(walk([(0, 0), (6, 0)], 1.0), stand((3.0, 0.0), 0, 30)), GoStraight())

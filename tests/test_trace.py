@@ -12,7 +12,7 @@ from episodes import Agent, Pedestrian, Touch, build_episode, line
 from rerun.chunk import RrdReader
 
 from socialnav_mj.episode import Episode, Outcome, Partner
-from socialnav_mj.trace.events import events
+from socialnav_mj.trace.events import events, severities, touch_rows
 from socialnav_mj.trace.lanes import policy_changes, state_changes
 from socialnav_mj.trace.writer import chosen_agents, write_trace
 
@@ -293,6 +293,25 @@ def test_human_row_has_touches_without_force(tmp_path: Path) -> None:
     _, rows = read(write_trace(build_episode([robot], [person], [touch]), tmp_path / "human.rrd"))
     (label,) = rows["/scene/touches/now"]["Points3D:labels"].values()
     assert label[0].endswith("m/s")
+
+
+def test_wedged_and_overturned_are_told_in_words(tmp_path: Path) -> None:
+    robots = [
+        Agent(positions=line((0, 0), (2, 0), 5), outcome=Outcome.OVERTURNED, goal=(9, 0)),
+        Agent(positions=line((0, 3), (2, 3), 5), goal=(2, 3)),
+    ]
+    people = [Pedestrian(positions=line((2, y), (0, y), 5)) for y in (0.1, 3.1)]
+    touches = [
+        Touch(agent=i, partner=i, step=2.0, peak_force=40_673.0, squeeze=s) for i, s in enumerate((601.0, 599.0))
+    ]
+    episode = build_episode(robots, people, touches)
+    first, second = severities(episode, touch_rows(episode))
+    assert first.endswith("m/s, wedged") and second.endswith("m/s, 40673 N")
+    told = [text.split()[:3] for _, _, text in events(episode)]
+    assert ["robot", str(episode.agent_person[0]), "overturned"] in told
+    assert [change.state for change in state_changes(episode, linger=1.0)[0]][-2:] == ["overturned", ""]
+    static, _ = read(write_trace(episode, tmp_path / "wild.rrd"))
+    assert "1 arrived, 0 timed out, 1 overturned, 0 never spawned" in static["/run"]["TextDocument:text"][0]
 
 
 @pytest.mark.parametrize("who", ["nobody", "robots", "people"])

@@ -26,7 +26,7 @@ class CrowdVecEnv(VecEnv):
 
     An observation is a state of `socialnav_mj.features`. A slot without an agent stands still: its observation is 0 and
     `infos[slot]["active"]` is False for what its step was. When a run ends, `dones[slot]` is True,
-    `infos[slot]["terminal_observation"]` holds its last state (absorbing at the goal or after a collision), and
+    `infos[slot]["terminal_observation"]` holds its last state (absorbing at the goal, collided or overturned), and
     `infos[slot]["TimeLimit.truncated"]` says that a deadline ended it. When the last run of a scene has ended, the next
     scene begins. Rewards are the tasks' own; ReplayIRL replaces them.
     """
@@ -155,7 +155,7 @@ class CrowdVecEnv(VecEnv):
     def _terminal(self, outcome: int, state: NDArray[np.float32]) -> NDArray[np.float32]:
         if outcome == Outcome.ARRIVED:
             return absorbing_state(self._features.size, GOAL_FLAG).astype(np.float32)
-        if outcome == Outcome.COLLIDED:
+        if outcome in (Outcome.COLLIDED, Outcome.OVERTURNED):
             return absorbing_state(self._features.size, COLLISION_FLAG).astype(np.float32)
         return state
 

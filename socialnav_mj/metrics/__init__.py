@@ -18,11 +18,13 @@ from socialnav_mj.metrics.faults import (
     largest_peak_force,
     repeated_collisions,
     struck_standing,
+    wedged_collisions,
 )
 from socialnav_mj.metrics.kinematics import (
     maximum_acceleration,
     maximum_jerk,
     maximum_speed,
+    maximum_tilt,
     mean_acceleration,
     mean_jerk,
     time_not_moving,
@@ -37,6 +39,7 @@ from socialnav_mj.metrics.navigation import (
     displacement,
     distance_to_displacement,
     never_spawned,
+    overturned,
     path_length,
     spawn_delay,
     success,
@@ -82,6 +85,7 @@ __all__ = [
     "maximum_acceleration",
     "maximum_jerk",
     "maximum_speed",
+    "maximum_tilt",
     "mean_acceleration",
     "mean_distance",
     "mean_jerk",
@@ -89,6 +93,7 @@ __all__ = [
     "minimum_time_to_collision",
     "nearest_pedestrian_distance",
     "never_spawned",
+    "overturned",
     "path_irregularity",
     "path_length",
     "per_agent",
@@ -102,6 +107,7 @@ __all__ = [
     "time_not_moving",
     "time_under_way",
     "timed_out",
+    "wedged_collisions",
     "zone_share",
 ]
 
@@ -119,6 +125,7 @@ def per_agent(episode: Episode) -> dict[str, NDArray[Any]]:
         "success": success(episode),
         "arrived": arrived(episode),
         "timed_out": timed_out(episode),
+        "overturned": overturned(episode),
         "never_spawned": never_spawned(episode),
         "completion_time": completion_time(episode),
         "completion_steps": completion_steps(episode),
@@ -133,6 +140,7 @@ def per_agent(episode: Episode) -> dict[str, NDArray[Any]]:
         "failures_to_progress": failures_to_progress(episode),
         "average_speed": average_speed(episode),
         "maximum_speed": maximum_speed(episode),
+        "maximum_tilt": maximum_tilt(episode),
         "mean_acceleration": mean_acceleration(episode),
         "maximum_acceleration": maximum_acceleration(episode),
         "mean_jerk": mean_jerk(episode),
@@ -159,5 +167,6 @@ def per_agent(episode: Episode) -> dict[str, NDArray[Any]]:
         "largest_closing_speed": largest_closing_speed(episode),
         "largest_peak_force": largest_peak_force(episode),
         **{f"collisions_{what.name.lower()}": collisions_by_severity(episode, what) for what in Severity},
+        "wedged_collisions": wedged_collisions(episode),
         "spawn_delay": spawn_delay(episode),
     }

@@ -7,7 +7,7 @@ from socialnav_mj.episode import Episode, Partner
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.collisions import counted_contacts
 from socialnav_mj.metrics.contacts import Fault, fault, first_touch, standing
-from socialnav_mj.metrics.severity import Severity, clamped, severity
+from socialnav_mj.metrics.severity import Severity, clamped, severity, wedged
 
 Counts = NDArray[np.int64]
 
@@ -74,6 +74,18 @@ def largest_peak_force(episode: Episode) -> Array:
         Shape (n_agents,); NaN for agents without such a collision and in the human row [N].
     """
     return _largest(episode, np.where(clamped(episode), np.nan, episode.contact_peak_force))
+
+
+def wedged_collisions(episode: Episode) -> Counts:
+    """Number of collisions in which a robot was held between bodies that did not yield; see `severity.wedged`.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,); 0 for agents that never spawned.
+    """
+    return _count(episode, wedged(episode))
 
 
 def collisions_by_severity(episode: Episode, what: Severity) -> Array:

@@ -60,6 +60,18 @@ def maximum_speed(episode: Episode) -> Array:
     return _largest(speed(episode))
 
 
+def maximum_tilt(episode: Episode) -> Array:
+    """Largest angle between the robot's mast and the vertical at a sample, from the spawn's to the end's.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,), in [0, pi]; NaN for agents that never spawned, 0 in the human row [rad].
+    """
+    return _largest(episode.agent_tilt)
+
+
 def mean_acceleration(episode: Episode) -> Array:
     """Mean of `acceleration`; agents start from rest, people do not.
 

@@ -61,6 +61,18 @@ def never_spawned(episode: Episode) -> BoolArray:
     return episode.agent_outcome == Outcome.NEVER_SPAWNED
 
 
+def overturned(episode: Episode) -> BoolArray:
+    """Whether each agent ended on its side or back.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return episode.agent_outcome == Outcome.OVERTURNED
+
+
 def spawn_delay(episode: Episode) -> Array:
     """Time between the person's appearance and the agent's real spawn.
 

@@ -36,6 +36,12 @@ LEG_MASS = 75.0
 ROBOT_MASS = 8.0
 """assets/robot.xml, without the rotors that the wheels turn [kg]."""
 
+WEDGE_FORCE = 600.0
+"""A robot that is squeezed harder is wedged. What its drive and its mass can explain is less: 10.5 kg (8 kg and 2.5 kg
+of rotors along the wheels) stopped from a walker's 1.3 m/s by a critically damped contact with a time constant of
+0.05 s, 2 m v / tau = 546 N, and 32 N of drive. Measured in students003: at most 350 N in a jam of robots that push on
+without end (scenario 4, go_straight, 120 s, 530 contacts), 26 000 N between two people [N]."""
+
 
 class Severity(IntEnum):
     """Class of a contact force against the limits for the lower leg."""
@@ -81,6 +87,21 @@ def clamped(episode: Episode) -> NDArray[np.bool_]:
     together = (agent[:, None] == agent) & (begin[:, None] < end) & (begin < end[:, None])
     np.fill_diagonal(together, False)
     return together.any(axis=1)
+
+
+def wedged(episode: Episode) -> NDArray[np.bool_]:
+    """Whether a robot of the contact was held between bodies that did not yield, so that its forces mean nothing.
+
+    Robots push with what their motors and mass give; a replayed person is moved by nothing. So a robot between two
+    people, or a row of robots between two, is squeezed without limit: by more than `WEDGE_FORCE`.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (k,); False in the human row.
+    """
+    return np.nan_to_num(episode.contact_squeeze) > WEDGE_FORCE
 
 
 def severity(episode: Episode, force: Array) -> IntArray:

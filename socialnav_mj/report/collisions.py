@@ -16,7 +16,7 @@ from socialnav_mj.metrics.contacts import (
     partner_person,
     standing,
 )
-from socialnav_mj.metrics.severity import Severity, flesh_force, severity
+from socialnav_mj.metrics.severity import Severity, flesh_force, severity, wedged
 
 CONTACT_SCHEMA = pa.schema(
     [
@@ -40,6 +40,8 @@ CONTACT_SCHEMA = pa.schema(
         ("duration", pa.float64()),
         ("impulse", pa.float64()),
         ("peak_force", pa.float64()),
+        ("squeeze", pa.float64()),
+        ("wedged", pa.bool_()),
         ("severity", pa.string()),
         ("flesh_force", pa.float64()),
         ("flesh_severity", pa.string()),
@@ -80,6 +82,8 @@ def contacts_table(episode: Episode, *, labels: dict[str, Any], file: str = "") 
         "duration": episode.contact_duration,
         "impulse": episode.contact_impulse,
         "peak_force": episode.contact_peak_force,
+        "squeeze": episode.contact_squeeze,
+        "wedged": wedged(episode),
         "severity": _names(Severity, severity(episode, episode.contact_peak_force)),
         "flesh_force": flesh,
         "flesh_severity": _names(Severity, severity(episode, flesh)),

@@ -22,6 +22,7 @@ Columns = dict[str, NDArray[Any]]
 MEASURES: dict[str, Callable[[Columns], Array]] = {
     "success": lambda c: c["success"],
     "timed_out": lambda c: c["timed_out"],
+    "overturned": lambda c: c["overturned"],
     "never_spawned": lambda c: c["never_spawned"],
     "first_hit_pedestrian": lambda c: c["first_partner"] == "pedestrian",
     "first_hit_agent": lambda c: c["first_partner"] == "agent",
@@ -47,6 +48,7 @@ MEASURES: dict[str, Callable[[Columns], Array]] = {
             "path_irregularity",
             "failures_to_progress",
             "maximum_speed",
+            "maximum_tilt",
             "mean_acceleration",
             "maximum_acceleration",
             "mean_jerk",
@@ -60,6 +62,7 @@ MEASURES: dict[str, Callable[[Columns], Array]] = {
             "space_compliance",
             "minimum_time_to_collision",
             "social_work",
+            "wedged_collisions",
             "repeated_collisions",
             "struck_standing",
             "largest_closing_speed",

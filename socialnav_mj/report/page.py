@@ -14,6 +14,7 @@ _COLUMNS = (
     ("hit first by a pedestrian", "first_hit_pedestrian", 3),
     ("hit first by an agent", "first_hit_agent", 3),
     ("timed out", "timed_out", 3),
+    ("overturned", "overturned", 3),
     ("time of successes [s]", "completion_time_success", 1),
     ("time, censored [s]", "time_under_way", 1),
     ("path / displacement", "distance_to_displacement", 3),
@@ -34,7 +35,8 @@ narrow for fewer than about 10). Controllers that share draws drove the same age
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
 - **success**: arrived, and touched nobody on the way, whoever was at fault; over all agents.
 - **hit first by**: share of all agents whose first touch was with a replayed pedestrian, or with another agent.
-- **timed out**: share of all agents whose deadline passed.
+- **timed out**: share of all agents whose deadline passed; **overturned**: of those that ended on their side or back, \
+which fails and ends the run.
 - **time of successes**: spawn to arrival, over successes alone. It flatters fragile controllers, whose successes are \
 the short trips; **time, censored** is over everybody who spawned and takes the time watched where an agent did not \
 arrive, a lower bound.

@@ -13,6 +13,7 @@ SHARES = (
     "timed_out",
     "first_hit_pedestrian",
     "first_hit_agent",
+    "overturned",
     "never_spawned",
     "intrusion_share_of_steps",
 )

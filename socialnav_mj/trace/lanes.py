@@ -13,6 +13,7 @@ ENDS: dict[Outcome, str] = {
     Outcome.COLLIDED: "taken out",
     Outcome.UNFINISHED: "stopped",
     Outcome.NEVER_SPAWNED: "never spawned",
+    Outcome.OVERTURNED: "overturned",
 }
 
 

@@ -28,6 +28,7 @@ STATES: dict[str, Colour] = {
     "arrived after collision": (150, 90, 60),
     "timed out": PINK,
     "taken out": (150, 50, 20),
+    "overturned": (120, 20, 90),
     "stopped": WHITE,
     "never spawned": GREY,
 }

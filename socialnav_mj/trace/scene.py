@@ -136,6 +136,7 @@ def _touches(episode: Episode, sink: Sink) -> None:
             "closing_speed": closing,
             "impulse": episode.contact_impulse[rows],
             "peak_force": episode.contact_peak_force[rows],
+            "squeeze": episode.contact_squeeze[rows],
             "duration": episode.contact_duration[rows],
         },
     )

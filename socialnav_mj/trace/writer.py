@@ -137,7 +137,7 @@ def _summary(episode: Episode, name: str, chosen: IntArray) -> str:
             f"**{int(success(episode).sum())} of {episode.n_agents} robots succeeded**: arrived and touched nobody.",
             "",
             f"- {counts[Outcome.ARRIVED]} arrived, {counts[Outcome.TIMED_OUT]} timed out, "
-            f"{counts[Outcome.NEVER_SPAWNED]} never spawned",
+            f"{counts[Outcome.OVERTURNED]} overturned, {counts[Outcome.NEVER_SPAWNED]} never spawned",
             f"- {int((collisions(episode) > 0).sum())} touched somebody: {with_people} touches with people, "
             f"{len(touches) - with_people} between robots",
             f"- recording {recording['name']} ({recording['variant']}), {episode.n_pedestrians} people replayed, "
