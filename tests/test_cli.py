@@ -279,7 +279,7 @@ def interrupted(folder, jobs, number=signal.SIGINT, *, all_of_them=True):
 def test_signal_leaves_finished_episodes_and_no_process_and_the_next_run_goes_on(jobs, number, all_of_them, capsys):
     code, errors = interrupted("o", jobs, number, all_of_them=all_of_them)
     assert code == 128 + number, errors
-    assert "interrupted; the same command goes on where it was" in errors and "Traceback" not in errors
+    assert "interrupted; repeat the command to resume" in errors and "Traceback" not in errors
     kept = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()}
     assert set(kept) == {"scenario_1.go_straight.draw_000.npz", "scenario_1.go_straight.draw_001.npz"}
     main([*QUICK, "--draws", "2", "--out", "o", "--controllers", "go_straight"])
@@ -380,7 +380,7 @@ def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
             ["evaluate"],
             ["--dataset", "--scenarios {1,2,3,4} ...", "--controllers", "--draws", "--seed", "--jobs", "--out"],
         ),
-        (["evaluate"], ["where it was", "rad/s", "(default: plaza)", "(default: 1 2 3 4)"]),
+        (["evaluate"], ["repeat the command to resume it", "rad/s", "(default: plaza)", "(default: 1 2 3 4)"]),
         (["report"], ["FOLDER", "--jobs"]),
         (["data"], ["list", "info", "fetch"]),
         (["data", "fetch"], ["NAME", "--data-dir"]),

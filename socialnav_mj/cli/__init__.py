@@ -51,7 +51,7 @@ def main(args: list[str] | None = None) -> None:
         with stoppable():
             command.run()
     except KeyboardInterrupt as stop:
-        say("interrupted; the same command goes on where it was", errors)
+        say("interrupted; repeat the command to resume", errors)
         sys.exit(128 + getattr(stop, "number", signal.SIGINT))
     except (ValueError, OSError, RuntimeError, PhysicsError) as error:
         say(f"error: {error}", errors, style="red")

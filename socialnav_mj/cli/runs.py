@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Evaluate:
     """Run scenarios with controllers, score them beside the recorded people, and write tables and traces.
 
-    Run again after an interruption, the same command goes on where it was.
+    If a run is interrupted, repeat the command to resume it.
     """
 
     dataset: str = "plaza"
@@ -42,7 +42,7 @@ class Evaluate:
     draws: int = 3
     """Random choices of the replaced people; 10 or more for figures to publish."""
     seed: int = 0
-    """Seed of the first draw; the others count up from it."""
+    """Number of the first draw; the others count up from it. Draws below 100 are for choosing, others for reporting."""
     jobs: int = -1
     """Processes; -1 for one a core."""
     out: Folder = None

@@ -14,7 +14,7 @@ from socialnav_mj.cli.console import counted_progress, errors, follow, say
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
-    """Learn a reward and a policy from recorded people; goes on with a training that was stopped."""
+    """Learn a reward and a policy from recorded people. If it is interrupted, repeat the command to resume it."""
 
     method: tyro.conf.Positional[Literal["replay-irl"]]
     """What to train."""
@@ -92,10 +92,10 @@ class Ship:
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce:
-    """Run the paper's experiment: potential field, ReplayIRL of each training, both mixed, and the recorded humans.
+    """Run the paper's study: potential field, ReplayIRL and hybrid of each training, and the recorded people.
 
-    Writes figures, tables and claims.md, with a verdict on every sentence of the paper's results. Run again after an
-    interruption, the same command goes on where it was.
+    Writes figures, tables and claims.md, with a verdict on every claim of the paper. If a run is interrupted, repeat
+    the command to resume it.
     """
 
     dataset: str = "students003"
@@ -113,9 +113,9 @@ class Reproduce:
     seed: int = 0
     """Seed of the first draw."""
     variants: bool = False
-    """Run the variants of the setting and the sweep of the switch distance as well."""
+    """Run the other settings and the sweep of the switch distance as well."""
     variant_draws: int | None = None
-    """Draws of the variants and the sweep; as many as of the default setting by default."""
+    """Draws of the other settings and the sweep; as many as of the default setting by default."""
     jobs: int = -1
     """Processes; -1 for one a core."""
     out: Path = Path("reproduction")
@@ -153,8 +153,8 @@ class Reproduce:
 class LeaveOneOut:
     """Run policies that learned from all recordings but one on each recording: in-sample and held out side by side.
 
-    Writes tables over the agents that replace people whom the in-sample policies learned from. Run again after an
-    interruption, the same command goes on where it was.
+    Writes tables over the agents that replace people whom the in-sample policies learned from. If a run is interrupted,
+    repeat the command to resume it.
     """
 
     recordings: tuple[str, ...] = ("students003", "zara01", "zara02")
