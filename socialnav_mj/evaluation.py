@@ -3,11 +3,10 @@
 import json
 import logging
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 import tasks
@@ -97,45 +96,6 @@ class Done:
     """[s]; None if the episode was there already or failed."""
     error: str | None = None
     """What went wrong, and where."""
-
-
-class Pace:
-    """How fast the episodes of an evaluation get done, and how long the rest will take."""
-
-    def __init__(self, jobs: Sequence[Job]) -> None:
-        """Start the clock.
-
-        Args:
-            jobs: All that are to be run or there already.
-        """
-        self._begin = self._last = monotonic()
-        self._waiting = sum(job.cost for job in jobs)
-        self._finished = self._simulated = 0.0
-
-    def note(self, done: Done) -> None:
-        """Take a job's cost from what is waiting; if it was run, add its cost and simulated time.
-
-        Args:
-            done: As `evaluate` yields it.
-        """
-        self._waiting -= done.job.cost
-        if done.simulated_time is not None:
-            self._finished += done.job.cost
-            self._simulated += done.simulated_time
-        self._last = monotonic()
-
-    @property
-    def rate(self) -> float | None:
-        """Simulated over real time, all processes together; None before the first episode."""
-        return self._simulated / (self._last - self._begin) if self._simulated else None
-
-    @property
-    def left(self) -> float | None:
-        """Time to the end if the rest costs what the finished episodes did [s]; None before the first episode."""
-        if not self._finished:
-            return None
-        total = (self._last - self._begin) * self._waiting / self._finished
-        return max(0.0, total - (monotonic() - self._last))
 
 
 def jobs_of(evaluation: Evaluation) -> list[Job]:

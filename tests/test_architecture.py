@@ -4,6 +4,7 @@ import ast
 import hashlib
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,7 +30,7 @@ ROWS = (
     {"learning"},
     {"studies"},
     {"studies.paper", "studies.leave_one_out"},
-    {"benchmark", "verification", "cli"},
+    {"benchmark", "resimulation", "verification", "cli"},
 )
 # A study uses what all studies share, and no other study.
 STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}
@@ -64,6 +65,10 @@ UCY_SUMS = {
     "8ae568fe9e62bf5be886bce898abda4ce82dd52bf4b09d4d89a4d6b105f1b1f5",  # zara02/groups.txt
     "0b29bdacd54b971299b741f291d9b0eac0ce9aeec9901e75576c529a39523e9b",  # zara02/obsmat.txt
 }
+MAX_LINES = 300
+"""Of a module."""
+MAX_SHARE = 0.2
+"""Of all lines, in one room with the rooms in it."""
 MAX_BYTES = 1_000_000
 MAY_BE_LARGE = ("assets/policies/", "data/plaza/")
 
@@ -162,6 +167,17 @@ def test_heavy_libraries_stay_in_their_rooms():
         if (top := target.split(".")[0]) in ONLY_IN and room_of(module) not in ONLY_IN[top]
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_no_module_and_no_room_is_too_long_to_be_read():
+    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for _, path in modules()}
+    long = [f"{path.relative_to(ROOT)}: {count} lines" for path, count in lines.items() if count > MAX_LINES]
+    assert not long, long
+    of_room: Counter[str] = Counter()
+    for module, path in modules():
+        of_room[room_of(module).split(".")[0]] += lines[path]
+    ((largest, count),) = of_room.most_common(1)
+    assert count < MAX_SHARE * sum(lines.values()), f"{largest} holds {count} of {sum(lines.values())} lines"
 
 
 def test_import_of_the_package_brings_in_no_heavy_library():

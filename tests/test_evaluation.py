@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import socialnav_mj.evaluation as evaluation_module
+from socialnav_mj.cli.pace import Pace
 from socialnav_mj.controllers import GoStraight
 from socialnav_mj.episode import Episode, EpisodeError, read_header
-from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, Pace, evaluate, jobs_of
+from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
 from socialnav_mj.report.writer import write_report
 
 TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
@@ -223,7 +224,7 @@ def test_report_makes_all_but_the_episodes_again(run):
 def test_pace_counts_what_was_run_and_not_what_was_there(monkeypatch):
     """Costs 2.5, 2.5 and 0.5 s: after 5 s for the first that was run, the rest of 0.5 s takes 1 s."""
     now = iter([100.0, 101.0, 105.0, 105.0, 105.25, 200.0])
-    monkeypatch.setattr(evaluation_module, "monotonic", lambda: next(now))
+    monkeypatch.setattr("socialnav_mj.cli.pace.monotonic", lambda: next(now))
     jobs = [
         Job(evaluation=wanted(), scenario="scenario_1", controller=controller, draw=draw)
         for controller, draw in (("a", 0), ("a", 1), ("human", 0))

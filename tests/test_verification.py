@@ -18,9 +18,10 @@ from socialnav_mj.episode import Episode, EpisodeError, Outcome
 from socialnav_mj.evaluation import Evaluation, evaluate
 from socialnav_mj.geometry import Array
 from socialnav_mj.report.writer import write_report
+from socialnav_mj.resimulation import Trust, resimulate
 from socialnav_mj.resources import assets_folder
 from socialnav_mj.trace.writer import write_trace
-from socialnav_mj.verification import Trust, files_of, resimulate, verify
+from socialnav_mj.verification import files_of, verify
 
 TINY = str(Path(__file__).parent / "data" / "tiny")
 

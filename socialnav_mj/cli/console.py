@@ -20,7 +20,8 @@ from rich.text import Text
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from socialnav_mj.evaluation import Done, Job, Pace
+    from socialnav_mj.cli.pace import Pace
+    from socialnav_mj.evaluation import Done, Job
 
 console = Console()
 errors = Console(stderr=True)
@@ -53,7 +54,7 @@ class _PaceColumn(ProgressColumn):
 
 def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
     """Run episodes behind a bar with their rate and the time left; tell at once what went wrong."""
-    from socialnav_mj.evaluation import Pace
+    from socialnav_mj.cli.pace import Pace
 
     pace = Pace(jobs)
     columns = (

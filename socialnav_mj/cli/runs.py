@@ -124,7 +124,8 @@ class Verify:
 
     def run(self) -> None:
         """Verify."""
-        from socialnav_mj.verification import Trust, files_of, verify
+        from socialnav_mj.resimulation import Trust
+        from socialnav_mj.verification import files_of, verify
 
         data_dir = None if self.data_dir is None else str(self.data_dir)
         trust = Trust(controllers=self.trust, robots=self.trust_robot)
