@@ -9,6 +9,18 @@ from typing import Any, Literal, get_args
 TurnLimit = Literal["per_step", "per_second"]
 OnCollision = Literal["continue", "retire"]
 
+ROBOT_RADII = (0.1, 0.4)
+"""Least and largest radius of a robot's bumper. A sphere whose centre is 0.10 m high has to reach down to the floor;
+a wide one tips on wheels that stand 0.12 m beside the middle: docs/metrics.md, "What the physics bears" [m]."""
+PEDESTRIAN_RADII = (0.05, 0.4)
+"""Least and largest radius of a person's body: thinner than a leg, or so wide that robots are thrown, as above [m]."""
+MAX_SPEED = 2.0
+"""Beyond it the wheels lose their grip in a turn: at 3 m/s a commanded 2.6 rad/s becomes 7.3 [m/s]."""
+MAX_YAW_RATE = 5.3
+"""Beyond it a robot at 1 m/s slides out of its circle: 0.92 m/s are left at 5.2 rad/s, 0.80 at 6.5 [rad/s]."""
+MAX_PHYSICS_TIMESTEP = 0.02
+"""Half of the wheels' contact time constant of 0.04 s; from more MuJoCo softens contacts without a word [s]."""
+
 
 def _require(condition: bool, name: str, given: object, allowed: str) -> None:
     if not condition:
@@ -18,6 +30,10 @@ def _require(condition: bool, name: str, given: object, allowed: str) -> None:
 def _require_number(given: Any, name: str, allowed: str, holds: Callable[[float], bool]) -> None:
     is_number = isinstance(given, Real) and not isinstance(given, bool) and isfinite(given)
     _require(is_number and holds(given), name, given, allowed)
+
+
+def _require_within(given: Any, name: str, low: float, high: float) -> None:
+    _require_number(given, name, f"numbers in [{low}, {high}]", lambda value: low <= value <= high)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +52,12 @@ class Robot:
     """Largest forward speed; there is no reverse (paper section III-B) [m/s]."""
 
     def __post_init__(self) -> None:
-        for name in ("radius", "wheel_radius", "track", "max_speed"):
+        for name in ("wheel_radius", "track"):
             _require_number(getattr(self, name), f"Robot.{name}", "numbers > 0", lambda value: value > 0.0)
+        _require_within(self.radius, "Robot.radius", *ROBOT_RADII)
+        _require_number(
+            self.max_speed, "Robot.max_speed", f"numbers in (0, {MAX_SPEED}]", lambda value: 0.0 < value <= MAX_SPEED
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,8 +109,15 @@ class Scenario:
             self.on_collision,
             ", ".join(get_args(OnCollision)),
         )
-        for name in ("pedestrian_radius", "control_timestep", "physics_timestep", "goal_radius"):
+        for name in ("control_timestep", "goal_radius"):
             _require_number(getattr(self, name), name, "numbers > 0", lambda value: value > 0.0)
+        _require_within(self.pedestrian_radius, "pedestrian_radius", *PEDESTRIAN_RADII)
+        _require_number(
+            self.physics_timestep,
+            "physics_timestep",
+            f"numbers in (0, {MAX_PHYSICS_TIMESTEP}]",
+            lambda value: 0.0 < value <= MAX_PHYSICS_TIMESTEP,
+        )
         for name in (
             "deadline_base",
             "deadline_per_metre",
@@ -104,6 +131,20 @@ class Scenario:
             "control_timestep",
             self.control_timestep,
             f"whole multiples of physics_timestep = {self.physics_timestep}",
+        )
+        longest = 2.0 * self.goal_radius / self.robot.max_speed
+        _require(
+            self.control_timestep <= longest,
+            "control_timestep",
+            self.control_timestep,
+            f"at most {longest:.3g}, in which a robot at {self.robot.max_speed} m/s crosses its goal unseen",
+        )
+        _require(
+            self.max_yaw_rate <= MAX_YAW_RATE,
+            "control_timestep",
+            self.control_timestep,
+            f"at least {pi / 6.0 / MAX_YAW_RATE:.3g} with turn_limit = {self.turn_limit!r}, or a robot may turn at "
+            f"{self.max_yaw_rate:.1f} rad/s",
         )
 
     @property

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from socialnav_mj.config import Robot, Scenario
+from socialnav_mj.config import PEDESTRIAN_RADII, ROBOT_RADII, Robot, Scenario
 
 
 def test_figures_that_follow_from_the_defaults_are_those_of_the_design() -> None:
@@ -63,9 +63,13 @@ def test_configuration_cannot_be_changed() -> None:
         ("seed", "1", "integers >= 0"),
         ("turn_limit", "per_minute", "per_step, per_second"),
         ("on_collision", "stop", "continue, retire"),
-        ("pedestrian_radius", 0.0, "numbers > 0"),
+        ("pedestrian_radius", 0.0, r"numbers in \[0\.05, 0\.4\]"),
+        ("pedestrian_radius", 0.41, r"numbers in \[0\.05, 0\.4\]"),
         ("goal_radius", float("inf"), "numbers > 0"),
-        ("physics_timestep", None, "numbers > 0"),
+        ("physics_timestep", None, r"numbers in \(0, 0\.02\]"),
+        ("physics_timestep", 0.025, r"numbers in \(0, 0\.02\]"),
+        ("control_timestep", 100.0, r"at most 1, in which a robot at 1\.0 m/s crosses its goal unseen"),
+        ("control_timestep", 0.09, r"at least 0\.0988 with turn_limit = 'per_step', or a robot may turn at 5\.8 rad/s"),
         ("control_timestep", 0.205, r"whole multiples of physics_timestep = 0\.01"),
         ("control_timestep", 0.001, r"whole multiples of physics_timestep = 0\.01"),
         ("deadline_base", -1.0, "numbers >= 0"),
@@ -77,8 +81,32 @@ def test_value_that_is_not_allowed_is_named_with_what_is(name: str, value: Any, 
         Scenario(**{name: value})
 
 
-@pytest.mark.parametrize("name", ["radius", "wheel_radius", "track", "max_speed"])
-@pytest.mark.parametrize("value", [0.0, -1.0, float("inf"), "wide"])
-def test_robot_dimension_that_is_not_allowed_is_named(name: str, value: Any) -> None:
-    with pytest.raises(ValueError, match=rf"^Robot\.{name} = .* is not allowed; allowed: numbers > 0$"):
+@pytest.mark.parametrize(
+    ("name", "allowed"),
+    [
+        ("radius", r"numbers in \[0\.1, 0\.4\]"),
+        ("wheel_radius", "numbers > 0"),
+        ("track", "numbers > 0"),
+        ("max_speed", r"numbers in \(0, 2\.0\]"),
+    ],
+)
+@pytest.mark.parametrize("value", [0.0, -1.0, float("inf"), "wide", True])
+def test_robot_dimension_that_is_not_allowed_is_named(name: str, allowed: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=rf"^Robot\.{name} = .* is not allowed; allowed: {allowed}$"):
         Robot(**{name: value})
+
+
+@pytest.mark.parametrize(("name", "value"), [("radius", 0.09), ("radius", 2.0), ("max_speed", 2.1)])
+def test_robot_that_the_physics_does_not_bear_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=rf"^Robot\.{name} = {value} is not allowed"):
+        Robot(**{name: value})
+
+
+def test_bounds_themselves_are_allowed_and_move_with_what_they_depend_on() -> None:
+    for robot, person in zip(ROBOT_RADII, PEDESTRIAN_RADII, strict=True):
+        Scenario(robot=Robot(radius=robot), pedestrian_radius=person)
+    Scenario(control_timestep=1.0)
+    Scenario(control_timestep=0.5, robot=Robot(max_speed=2.0))
+    Scenario(control_timestep=0.01, turn_limit="per_second")
+    with pytest.raises(ValueError, match=r"control_timestep = 0\.6 .* at most 0\.5, in which a robot at 2\.0 m/s"):
+        Scenario(control_timestep=0.6, robot=Robot(max_speed=2.0))

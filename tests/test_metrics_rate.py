@@ -48,7 +48,7 @@ def motions(draw, forward):
 def logged(agent, person, dt):
     """The same two walkers, logged every dt, with their true velocities and headings."""
     t = dt * np.arange(round(DURATION / dt) + 1)
-    scenario = Scenario(control_timestep=dt, physics_timestep=dt)
+    scenario = Scenario(control_timestep=dt, physics_timestep=FINE, turn_limit="per_second")
     episode = build_episode(
         [Agent(positions=agent.at(t), goal=GOAL)], [Pedestrian(positions=person.at(t))], scenario=scenario
     )
