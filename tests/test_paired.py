@@ -1,6 +1,7 @@
 """Agents beside the people they replaced, who was at fault, and how many draws it takes: from table to report."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -164,6 +165,21 @@ def test_report_shows_pairs_and_their_figure(run, written):
     assert (run / "figures" / "paired_humans.png").read_bytes().startswith(b"\x89PNG")
     assert pq.read_table(run / "tables" / "collisions.parquet").schema == CONTACT_SCHEMA
     assert len((run / "tables" / "paired.csv").read_text().splitlines()) == 1 + 2 * len(DIFFERENCES)
+
+
+def test_legend_of_many_long_names_stays_within_the_figure(results, monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr("socialnav_mj.report.paired_figure.save", lambda figure, *_: drawn.append(figure) or [])
+    names = [f"hybrid(near=\"replay_irl(policy='students003_continuous_seed{i}')\")" for i in range(9)]
+    differences = [e for e in paired_differences(results.agents) if e.controller == "slow"]
+    for chosen in (names, ["quick", "slow"]):
+        draw_paired([replace(e, controller=name) for name in chosen for e in differences], tmp_path)
+        figure = drawn.pop()
+        figure.canvas.draw()
+        (legend,) = figure.legends
+        box, whole = legend.get_window_extent(), figure.bbox
+        assert whole.x0 <= box.x0 and box.x1 <= whole.x1 and box.y1 <= whole.y1
+        assert min(axes.get_window_extent().height for axes in figure.axes) > 0.2 * whole.height
 
 
 def test_figure_of_equal_numbers_has_equal_bytes(results, tmp_path):

@@ -16,6 +16,8 @@ PANELS = (
 )
 """Key of `paired.DIFFERENCES` and the axis' label."""
 
+LEGEND_WIDTH = 120
+"""Characters that fit beside each other; every entry has a mark and a margin, 8 wide."""
 _MARKS = "osD^vPX<>*"
 _GREYS = ("0.0", "0.45", "0.7", "0.25", "0.6")
 
@@ -36,12 +38,13 @@ def draw_paired(differences: Sequence[Estimate], folder: Path) -> list[Path]:
     places = list(dict.fromkeys((e.dataset, e.variant, e.scenario) for e in shown))
     controllers = list(dict.fromkeys(e.controller for e in shown))
     with style():
-        figure = new_figure(4.8)
+        columns = max(1, min(5, len(controllers), LEGEND_WIDTH // (max(map(len, controllers)) + 8)))
+        figure = new_figure(4.6 + 0.17 * math.ceil(len(controllers) / columns))
         for (measure, label), axes in zip(PANELS, figure.subplots(2, 2).flat, strict=True):
             _draw(axes, [e for e in shown if e.measure == measure], places, controllers)
             axes.set_ylabel(label)
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=min(5, len(labels)))
+        figure.legend(handles, labels, loc="outside upper center", ncols=columns)
         figure.supxlabel("agent minus the person it replaced; bars: 95 % interval over draws", fontsize=8.0)
         return save(figure, folder, "paired_humans")
 
@@ -49,7 +52,7 @@ def draw_paired(differences: Sequence[Estimate], folder: Path) -> list[Path]:
 def _draw(axes: Any, shown: Sequence[Estimate], places: Sequence[tuple[str, ...]], controllers: Sequence[str]) -> None:
     several = len({place[:2] for place in places}) > 1
     names = [" ".join(place[::2]) if several else place[2] for place in places]
-    axes.axhline(0.0, color="0.0", linewidth=0.8, linestyle=(0, (4, 3)), zorder=0)
+    axes.axhline(0.0, color="0.0", linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     for i, controller in enumerate(controllers):
         own = [e for e in shown if e.controller == controller]
         shift = 0.5 * (i - 0.5 * (len(controllers) - 1)) / max(1, len(controllers))
