@@ -1,0 +1,56 @@
+"""A few wild episodes in every run of the tests, a hundred in the slow ones; `python -m tests.wild` runs any number."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scenes import environment_of, still, walk
+from wild import WatchedPhysics, broken_rules, main, run_wild, summary
+
+from socialnav_mj.environment import Environment
+
+wild_run = cache(run_wild)
+
+
+@pytest.mark.parametrize("seed", [0, 5, 7, 9])
+def test_wild_episode_breaks_no_rule(seed: int) -> None:
+    run = wild_run(seed)
+    assert run.broken == []
+    assert "1 episodes, " in summary([run]) and "0 episodes broke a rule" in summary([run])
+
+
+@pytest.mark.slow
+def test_hundred_wild_episodes_break_no_rule() -> None:
+    assert main(["--episodes", "100", "--seed", "10000", "--jobs", "-1"]) == 0
+
+
+def test_broken_rules_are_told() -> None:
+    run, other = wild_run(7), wild_run(9)
+    assert len(run.episode.contact_time)
+    assert broken_rules(run, run.episode) == []
+    assert broken_rules(run, other.episode) == ["a second run has another state hash"]
+    assert "a robot at 99.00 m/s" in broken_rules(replace(run, speed=99.0), run.episode)[0]
+    assert "3 bodies went through a robot" in broken_rules(replace(run, tunnels=3), run.episode)[0]
+    assert "slots" in broken_rules(replace(run, lost_slots=1), run.episode)[0]
+    forces = np.full_like(run.episode.contact_impulse, np.inf)
+    endless = replace(run, episode=replace(run.episode, contact_impulse=forces))
+    assert broken_rules(endless, run.episode) == ["a contact force is not finite and >= 0"]
+    told = summary([run, replace(other, broken=["it fell apart"])])
+    assert "1 episodes broke a rule" in told and "seed 9" in told.splitlines()[-1] and "it fell apart" in told
+
+
+@pytest.mark.parametrize("solid", [True, False])
+def test_person_who_walks_through_a_robot_is_seen(solid: bool) -> None:
+    environment = environment_of(walk([(0, 0), (10, 0)], 1.0), walk([(1.5, 0.01), (-9, 0.01)], 1.0), agents=[1])
+    physics = WatchedPhysics.from_mujoco(environment.physics.model.ptr)
+    physics.watch(environment.task)
+    watched = Environment(physics, environment.task, control_timestep=0.2)
+    watched.reset()
+    if not solid:
+        physics.model.geom_contype[physics.model.geom("agent_000/bumper").id] = 0
+        physics.model.geom_conaffinity[physics.model.geom("agent_000/bumper").id] = 0
+    for _ in range(15):
+        watched.step(still(watched))
+    assert bool(physics.tunnels) is not solid
+    assert physics.lost_slots == 0

@@ -1,0 +1,353 @@
+"""Wild episodes: crowds that no recording has, controllers that nobody would use, and what must never break.
+
+`python -m tests.wild --episodes 1000 --seed 0 --jobs 2` runs them with progress and prints a summary; episode k of a
+seed is always the same, and `--episodes 1 --seed K` repeats the one that a failure names.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from socialnav_mj.cast import NOBODY
+from socialnav_mj.config import PEDESTRIAN_RADII, ROBOT_RADII, Robot, Scenario
+from socialnav_mj.controllers import Controller, GoStraight, Limits, PotentialField
+from socialnav_mj.environment import Environment, build_environment
+from socialnav_mj.episode import Episode, Outcome
+from socialnav_mj.geometry import Array
+from socialnav_mj.metrics import per_agent
+from socialnav_mj.metrics.severity import wedged
+from socialnav_mj.outcome import OVERTURNED_TILT
+from socialnav_mj.physics import Physics
+from socialnav_mj.processes import in_processes
+from socialnav_mj.recordings import Recording
+from socialnav_mj.rollout import rollout
+
+FRAME = 0.04
+"""Between two frames of the recordings [s]."""
+FASTEST = 3.0
+"""People run at most this fast, unless they teleport [m/s]."""
+EJECTION = np.exp(-1.0) / 0.05
+"""A contact with damping ratio 1 and time constant 0.05 s throws a body that overlaps by d out at d / (e tau) [1/s]."""
+
+
+# Crowds
+
+Track = tuple[Array, Array]
+"""Times (k,) [s] and positions (k, 2) [m]."""
+
+
+def _times(random: np.random.Generator) -> Array:
+    begin, duration = random.uniform(0.0, 5.0), random.uniform(2.0, 12.0)
+    return np.round(begin / FRAME) * FRAME + FRAME * np.arange(max(2, int(duration / FRAME)))
+
+
+def _crossing(random: np.random.Generator, side: float, speed: float | None = None) -> Track:
+    angle, turn = random.uniform(0.0, 2.0 * np.pi), random.uniform(2.0, 4.3)
+    ends = 0.5 * side * np.stack([[np.cos(a), np.sin(a)] for a in (angle, angle + turn)])
+    speed = speed or random.uniform(0.2, 1.8)
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    count = max(2, int(length / speed / FRAME))
+    times = np.round(random.uniform(0.0, 6.0) / FRAME) * FRAME + FRAME * np.arange(count)
+    return times, ends[0] + np.linspace(0.0, 1.0, count)[:, None] * (ends[1] - ends[0])
+
+
+def _running(random: np.random.Generator, side: float) -> Track:
+    return _crossing(random, side, FASTEST)
+
+
+def _standing(random: np.random.Generator, side: float) -> Track:
+    times = _times(random)
+    return times, np.tile(random.uniform(-0.5 * side, 0.5 * side, 2), (len(times), 1))
+
+
+def _milling(random: np.random.Generator, side: float) -> Track:
+    """Dense: wander about the middle at up to walking speed."""
+    times = _times(random)
+    speed = random.uniform(0.2, 1.4)
+    heading = np.cumsum(random.normal(0.0, 0.3, len(times)))
+    way = np.cumsum(speed * FRAME * np.stack([np.cos(heading), np.sin(heading)], axis=-1), axis=0)
+    reach = 0.25 * side
+    return times, np.abs((way + random.uniform(-reach, reach, 2)) % (4.0 * reach) - 2.0 * reach) - reach
+
+
+def _teleporting(random: np.random.Generator, side: float) -> Track:
+    """Jump to another place within a frame, again and again."""
+    times = _times(random)
+    places = random.uniform(-0.5 * side, 0.5 * side, (len(times) // random.integers(10, 60) + 1, 2))
+    return times, np.repeat(places, -(-len(times) // len(places)), axis=0)[: len(times)]
+
+
+def _shuttling(random: np.random.Generator, side: float) -> Track:
+    """Back and forth on a short line, with full turns."""
+    times = _times(random)
+    direction = random.normal(size=2)
+    reach, period = random.uniform(0.1, 0.8), random.uniform(0.8, 4.0)
+    swing = np.minimum(reach, 0.25 * FASTEST * period) * np.abs(4.0 * ((times / period) % 1.0) - 2.0)
+    return times, random.uniform(-0.4 * side, 0.4 * side, 2) + swing[:, None] * direction / np.linalg.norm(direction)
+
+
+KINDS: tuple[Callable[[np.random.Generator, float], Track], ...] = (
+    _crossing,
+    _running,
+    _standing,
+    _milling,
+    _teleporting,
+    _shuttling,
+)
+"""Ways to move."""
+
+
+def wild_recording(random: np.random.Generator) -> Recording:
+    """A crowd of people of several kinds in a small place; one at least crosses it, so that there is an agent."""
+    side, count = random.uniform(2.0, 8.0), int(random.integers(2, 31))
+    weights = random.dirichlet(np.full(len(KINDS), 0.5))
+    kinds = [_crossing, *(KINDS[k] for k in random.choice(len(KINDS), count - 1, p=weights))]
+    tracks = [kind(random, side) for kind in kinds]
+    return Recording(
+        name="wild",
+        variant="made",
+        frame_rate=1.0 / FRAME,
+        ids=np.arange(count),
+        times=tuple(times for times, _ in tracks),
+        positions=tuple(positions for _, positions in tracks),
+        checksum="0" * 64,
+    )
+
+
+def wild_scenario(random: np.random.Generator) -> Scenario:
+    """Any setting that the configuration allows and that changes what happens."""
+    return Scenario(
+        share=float(random.choice([0.1, 0.3, 0.7, 0.9, 1.0])),
+        seed=int(random.integers(1000)),
+        robot=Robot(radius=float(random.choice([0.17, random.uniform(*ROBOT_RADII)]))),
+        pedestrian_radius=float(random.choice([0.15, random.uniform(*PEDESTRIAN_RADII)])),
+        turn_limit=str(random.choice(["per_step", "per_second"])),
+        on_collision=str(random.choice(["continue", "continue", "retire"])),
+        control_timestep=float(random.choice([0.1, 0.2, 0.4])),
+    )
+
+
+# Controllers
+
+
+class Wheels:
+    """Wheel speeds that see nothing: "random" at every step, or "full" speed ahead."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def reset(self, limits: Limits, *, seed: int = 0) -> None:
+        """Begin an episode."""
+        self._limits, self._random = limits, np.random.default_rng(seed)
+
+    def act(self, observation: dict[str, Array]) -> Array:
+        """Commands, up to three times of what the limits allow."""
+        shape, fastest = (len(observation["active"]), 2), self._limits.max_speed / self._limits.wheel_radius
+        return np.full(shape, fastest) if self.name == "full" else self._random.uniform(-3.0, 3.0, shape) * fastest
+
+
+def wild_controller(random: np.random.Generator) -> Controller:
+    """Blind, straight or repelled."""
+    return [Wheels("random"), Wheels("full"), GoStraight(), PotentialField()][random.integers(4)]
+
+
+# What is seen
+
+
+class WatchedPhysics(Physics):
+    """The same physics, looked at after every physics step."""
+
+    def watch(self, task) -> None:
+        """Say whose bodies are looked at; forget what was seen."""
+        self._task, scenario = task, task.scenario
+        self.speed = self.tilt = 0.0
+        self.tunnels = self.lost_slots = 0
+        reach = np.full(self.n_agents + self.n_pedestrians, 2.0 * scenario.robot.radius)
+        reach[self.n_agents :] = scenario.contact_distance
+        shape = (self.n_agents, len(reach))
+        self._reach = np.broadcast_to(reach, shape)
+        self._offset = np.full((*shape, 2), np.inf)
+        self._entry, self._nearest = np.full((*shape, 2), np.nan), np.full(shape, np.inf)
+        self._overlap = np.zeros(shape, dtype=bool)
+
+    def step(self, nstep: int = 1) -> None:
+        """Step one by one."""
+        path, velocity = self._path, self._path_velocity
+        for k in range(nstep):
+            if path is not None:
+                self.set_pedestrian_path(path[k : k + 1], velocity[k : k + 1])
+            super().step(1)
+            self._look()
+
+    def _look(self) -> None:
+        robots = self._task.slot_agent != NOBODY
+        self.lost_slots += not np.array_equal(self.data.qpos[self._index.qpos + 2] > -5.0, robots)
+        if robots.any():
+            self.speed = max(self.speed, float(np.linalg.norm(self.agent_velocity()[robots], axis=1).max()))
+            self.tilt = max(self.tilt, float(self.agent_tilt()[robots].max()))
+        self._look_for_tunnels(robots)
+
+    def _look_for_tunnels(self, robots: Array) -> None:
+        """Count pairs that began to overlap on one side, came near each other's centre and were then on the other side.
+
+        Whoever jumps by a quarter of both radii in a physics step is not held to it until the two are apart again.
+        """
+        solid = np.concatenate([robots, self.model.geom_contype[self._index.pedestrian_geom] > 0])
+        at = self.agent_position()
+        offset = np.concatenate([at, self.data.mocap_pos[:, :2]]) - at[:, None]
+        distance = np.linalg.norm(offset, axis=-1)
+        overlap = robots[:, None] & solid & (distance < self._reach)
+        np.fill_diagonal(overlap, False)
+        begun, jumped = overlap & ~self._overlap, np.linalg.norm(offset - self._offset, axis=-1) > 0.25 * self._reach
+        self._entry[begun], self._nearest[begun] = offset[begun], np.inf
+        self._entry[jumped | ~overlap] = np.nan
+        self._nearest = np.minimum(self._nearest, distance)
+        through = (np.einsum("ijd,ijd->ij", self._entry, offset) < 0.0) & (self._nearest < 0.3 * self._reach)
+        self.tunnels += int(through.sum())
+        self._entry[through] = np.nan
+        self._offset, self._overlap = offset, overlap
+
+
+@dataclass(kw_only=True)
+class Run:
+    """One wild episode and what was seen of it."""
+
+    seed: int
+    label: str
+    episode: Episode
+    speed: float
+    """Fastest robot at any physics step [m/s]."""
+    tilt: float
+    """Largest tilt of a robot at any physics step [rad]."""
+    tunnels: int
+    """Bodies that went through a robot."""
+    lost_slots: int
+    """Physics steps at which the robots in the scene were not those under way."""
+    speed_bound: float
+    """See `speed_bound` [m/s]."""
+    n_people: int
+    """In the recording."""
+    broken: list[str] = field(default_factory=list)
+    """What broke."""
+
+
+def speed_bound(scenario: Scenario) -> float:
+    """No robot is faster: pushed by the fastest person, or thrown out of the deepest overlap, while it drives [m/s]."""
+    bodies = scenario.robot.radius + max(scenario.robot.radius, scenario.pedestrian_radius)
+    return max(FASTEST, scenario.robot.max_speed) + EJECTION * bodies
+
+
+def run_wild(seed: int) -> Run:
+    """Make and run one wild episode twice, and hold it to the rules.
+
+    Args:
+        seed: Of everything in it.
+
+    Returns:
+        What happened; its list of what broke is empty if all is well.
+    """
+    random = np.random.default_rng(seed)
+    recording, scenario = wild_recording(random), wild_scenario(random)
+    controller = wild_controller(random)
+    plain = build_environment(recording, scenario)
+    watched = WatchedPhysics.from_mujoco(plain.physics.model.ptr)
+    watched.watch(plain.task)
+    episode = rollout(Environment(watched, plain.task, control_timestep=scenario.control_timestep), controller)
+    again = rollout(build_environment(recording, scenario), controller)
+    run = Run(
+        seed=seed,
+        label=(
+            f"{controller.name}, {recording.n_people} people, share {scenario.share}, radii "
+            f"{scenario.robot.radius:.2f} and {scenario.pedestrian_radius:.2f} m, {scenario.on_collision}"
+        ),
+        episode=episode,
+        speed=watched.speed,
+        tilt=watched.tilt,
+        tunnels=watched.tunnels,
+        lost_slots=watched.lost_slots,
+        speed_bound=speed_bound(scenario),
+        n_people=recording.n_people,
+    )
+    run.broken = broken_rules(run, again)
+    return run
+
+
+def broken_rules(run: Run, again: Episode) -> list[str]:
+    """What a run breaks of what must always hold; Episode itself checks shapes, presence, order and tilt."""
+    episode, broken = run.episode, []
+    if again.metadata["state_hash"] != episode.metadata["state_hash"]:
+        broken.append("a second run has another state hash")
+    if run.speed > run.speed_bound:
+        broken.append(f"a robot at {run.speed:.2f} m/s, bound {run.speed_bound:.2f}")
+    if run.lost_slots:
+        broken.append(f"slots and robots in the scene differed in {run.lost_slots} physics steps")
+    if run.tunnels and not wedged(episode).any():
+        broken.append(f"{run.tunnels} bodies went through a robot that was not wedged")
+    outcome = episode.agent_outcome
+    if np.isin(outcome, [Outcome.UNFINISHED]).any():
+        broken.append("an agent is under way after the end")
+    if not np.array_equal(np.isfinite(episode.agent_spawn_time), outcome != Outcome.NEVER_SPAWNED):
+        broken.append("spawns and outcomes do not add up")
+    if (outcome == Outcome.OVERTURNED).any() and run.tilt <= OVERTURNED_TILT:
+        broken.append("overturned without a tilt")
+    forces = np.concatenate([episode.contact_impulse, episode.contact_peak_force, episode.contact_squeeze])
+    if not np.isfinite(forces).all() or (forces < 0.0).any():
+        broken.append("a contact force is not finite and >= 0")
+    values = per_agent(episode)
+    if (values["success"] & ~values["arrived"]).any() or (values["success"] & values["overturned"]).any():
+        broken.append("success of an agent that did not arrive")
+    if episode.n_agents + episode.n_pedestrians > run.n_people:
+        broken.append("more people than the recording has")
+    return broken
+
+
+# The runner
+
+
+def summary(runs: list[Run]) -> str:
+    """Figures of many runs, a line each."""
+    outcomes = np.concatenate([run.episode.agent_outcome for run in runs])
+    counts = ", ".join(f"{int((outcomes == outcome).sum())} {outcome.name.lower()}" for outcome in Outcome)
+    squeezed = np.concatenate([run.episode.contact_squeeze for run in runs])
+    held = np.concatenate([wedged(run.episode) for run in runs])
+    peak = np.concatenate([run.episode.contact_peak_force for run in runs])
+    fastest, most = max(runs, key=lambda run: run.speed), max(runs, key=lambda run: run.tilt)
+    return "\n".join(
+        [
+            f"{len(runs)} episodes, {len(outcomes)} agents: {counts}",
+            f"{len(held)} contacts, {int(held.sum())} wedged; largest force {np.max(peak[~held], initial=0.0):.0f} N "
+            f"free, {np.max(peak[held], initial=0.0):.0f} N wedged, squeeze {np.max(squeezed, initial=0.0):.0f} N",
+            f"fastest robot {fastest.speed:.2f} m/s (seed {fastest.seed}: {fastest.label})",
+            f"largest tilt {np.degrees(most.tilt):.1f} degrees (seed {most.seed}: {most.label})",
+            f"{sum(run.tunnels > 0 for run in runs)} episodes in which a body went through a wedged robot",
+            f"{sum(bool(run.broken) for run in runs)} episodes broke a rule",
+            *(f"  seed {run.seed} ({run.label}): {'; '.join(run.broken)}" for run in runs if run.broken),
+        ]
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run many; the exit code is 1 if one broke a rule."""
+    parser = argparse.ArgumentParser(prog="python -m tests.wild", description=__doc__.splitlines()[0])
+    parser.add_argument("--episodes", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0, help="of the first episode; the others count up from it")
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args(arguments)
+    runs: list[Run] = []
+    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns) as progress:
+        bar = progress.add_task("", total=options.episodes)
+        seeds = [(options.seed + k,) for k in range(options.episodes)]
+        for run in in_processes(run_wild, seeds, n_jobs=options.jobs):
+            runs.append(run)
+            progress.advance(bar)
+    print(summary(runs))  # noqa: T201
+    return int(any(run.broken for run in runs))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
