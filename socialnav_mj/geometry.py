@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from socialnav_mj.elementary import arctan2, cos, sin
+
 Array = NDArray[np.float64]
 
 
@@ -28,10 +30,10 @@ def to_agent_frame(vector: ArrayLike, heading: ArrayLike) -> Array:
     Returns:
         The vectors' components ahead of and to the left of the agent, shape (..., 2).
     """
-    # One complex product instead of four real ones: this is called for every pair of bodies at every control step.
-    plane = np.ascontiguousarray(vector, dtype=float).view(complex)[..., 0]
-    turned: Array = (plane * np.exp(-1j * np.asarray(heading, dtype=float)))[..., None].view(float)
-    return turned
+    vector = np.asarray(vector, dtype=float)
+    x, y, c, s = vector[..., 0], vector[..., 1], cos(heading), sin(heading)
+    # Not one complex product: that rounds otherwise on other processors, see `elementary`.
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
 
 def yaw_of_quaternion(quaternion: ArrayLike) -> Array:
@@ -45,7 +47,7 @@ def yaw_of_quaternion(quaternion: ArrayLike) -> Array:
     """
     quaternion = np.asarray(quaternion, dtype=float)
     w, x, y, z = quaternion[..., 0], quaternion[..., 1], quaternion[..., 2], quaternion[..., 3]
-    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def quaternion_of_yaw(yaw: ArrayLike) -> Array:
@@ -59,7 +61,7 @@ def quaternion_of_yaw(yaw: ArrayLike) -> Array:
     """
     half = 0.5 * np.asarray(yaw, dtype=float)
     zero = np.zeros_like(half)
-    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+    return np.stack([cos(half), zero, zero, sin(half)], axis=-1)
 
 
 def wheel_speed_of_twist(twist: ArrayLike, *, wheel_radius: float, track: float) -> Array:

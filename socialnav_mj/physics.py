@@ -7,6 +7,7 @@ from dm_control.mujoco.wrapper import MjData, MjModel
 from dm_control.rl.control import PhysicsError
 from numpy.typing import NDArray
 
+from socialnav_mj.elementary import arccos
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
 from socialnav_mj.scene import REARM_TIME, agent_name
@@ -115,7 +116,7 @@ class Physics(MujocoPhysics):
             Shape (n_agents,) [rad].
         """
         _, x, y, _ = self._agent_quaternion().T
-        return np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
+        return arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
 
     def _agent_quaternion(self) -> Array:
         return self.data.qpos[self._index.qpos[:, None] + (3, 4, 5, 6)]

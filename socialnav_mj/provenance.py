@@ -1,6 +1,8 @@
 """Where a result comes from: versions, recording and configuration, and the hash of what was simulated."""
 
 import hashlib
+import os
+import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -46,6 +48,7 @@ def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> d
         "draw": scenario.seed,
         "recording": recording_metadata(recording),
         "versions": package_versions(PACKAGES),
+        "platform": platform_facts(),
     }
 
 
@@ -65,6 +68,22 @@ def recording_metadata(recording: Recording) -> dict[str, Any]:
         "frame_rate": recording.frame_rate,
         "reading": dict(recording.reading),
     }
+
+
+def platform_facts() -> dict[str, str]:
+    """What the last bits of a simulation depend on besides packages.
+
+    MuJoCo takes sines and roots from the C library, which rounds some otherwise on processors without fused
+    multiply-add (before 2013), and in other versions.
+
+    Returns:
+        machine (architecture, and the levels of vector instructions that numpy found), c_library.
+    """
+    levels = np.show_config(mode="dicts")["SIMD Extensions"]
+    found = [*levels.get("baseline", []), *levels.get("found", [])]
+    names = os.confstr_names
+    c_library = os.confstr("CS_GNU_LIBC_VERSION") if "CS_GNU_LIBC_VERSION" in names else None
+    return {"machine": " ".join([platform.machine(), *found]), "c_library": c_library or "unknown"}
 
 
 def package_versions(names: tuple[str, ...]) -> dict[str, str]:

@@ -258,7 +258,7 @@ class CrowdTask(base.Task):
             self._queue.let_in(agent)
             self._slot_agent[slot] = agent
             self.spawn_step[agent] = self.step
-            self._goal_distance[slot] = np.linalg.norm(self.cast.agent_goal[agent] - start)
+            self._goal_distance[slot] = np.linalg.norm(self.cast.agent_goal[agent] - start, axis=-1)
         return len(free) < n_free
 
     def _note_collisions(self, physics: Physics) -> list[int]:

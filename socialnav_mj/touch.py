@@ -53,7 +53,7 @@ def squeeze_force(forces: Array) -> float:
     Returns:
         0 for forces in one direction, F for two of size F that oppose each other [N].
     """
-    return 0.5 * float(np.linalg.norm(forces, axis=1).sum() - np.linalg.norm(forces.sum(axis=0)))
+    return 0.5 * float(np.linalg.norm(forces, axis=1).sum() - np.linalg.norm(forces.sum(axis=0), axis=-1))
 
 
 class TouchLog:
@@ -177,7 +177,7 @@ class TouchLog:
         agent, other = pair
         index = self._index
         normal = data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
-        length = float(np.linalg.norm(normal))
+        length = float(np.linalg.norm(normal, axis=-1))
         heading = yaw_of_quaternion(data.qpos[index.qpos[:, None] + (3, 4, 5, 6)])
         if other < index.n_agents:
             kind, partner = Partner.AGENT, other

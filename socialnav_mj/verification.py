@@ -12,11 +12,14 @@ import pyarrow.parquet
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.processes import in_processes
-from socialnav_mj.provenance import package_versions
+from socialnav_mj.provenance import package_versions, platform_facts
 from socialnav_mj.recordings import DEFAULT_READING, Reading
 from socialnav_mj.report.run_file import RUN_FILE, read_run_file
 from socialnav_mj.report.writer import report_tables
 from socialnav_mj.resimulation import Trust, resimulate
+
+_TOLD = ("versions", "platform")
+"""Metadata that may differ, and are told beside what differs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +35,7 @@ class Verdict:
     error: str | None = None
     """Why the file could not be checked."""
     other_versions: tuple[str, ...] = ()
-    """Packages whose version is not the one the file was made with, as "name: then, now"."""
+    """Packages, machine and C library that are not those the file was made with, as "name: then, now"."""
 
     @property
     def same(self) -> bool:
@@ -123,8 +126,9 @@ def _verify_trace(path: Path, dataset: str | None, data_dir: str | None, trust: 
     again = resimulate(metadata, dataset=dataset, data_dir=data_dir, trust=trust, bounds=bounds)
     differences = _differing_metadata(metadata, again.metadata)
     if not differences:
-        # Versions may differ, and are told; the trace shows them.
-        again = replace(again, metadata={**again.metadata, "versions": metadata["versions"]})
+        # The trace shows them.
+        then = {name: metadata[name] for name in _TOLD if name in metadata}
+        again = replace(again, metadata={k: v for k, v in again.metadata.items() if k not in _TOLD} | then)
         with TemporaryDirectory() as folder:
             differences = differing_columns(path, write_trace(again, Path(folder) / path.name))
     return Verdict(
@@ -136,13 +140,13 @@ def _verify_trace(path: Path, dataset: str | None, data_dir: str | None, trust: 
 
 
 def _other_versions(metadata: dict[str, Any]) -> tuple[str, ...]:
-    then = metadata["versions"]
-    now = package_versions(tuple(then))
-    return tuple(f"{name}: {then[name]}, {now[name]}" for name in then if then[name] != now[name])
+    then = {**metadata["versions"], **metadata.get("platform", {})}
+    now = {**package_versions(tuple(metadata["versions"])), **platform_facts()}
+    return tuple(f"{name}: {then[name]}, {now[name]}" for name in then if then[name] != now.get(name))
 
 
 def _differing_metadata(stored: dict[str, Any], again: dict[str, Any]) -> tuple[str, ...]:
-    names = [name for name in {**stored, **again} if name != "versions" and stored.get(name) != again.get(name)]
+    names = [name for name in {**stored, **again} if name not in _TOLD and stored.get(name) != again.get(name)]
     return tuple(f"{name} is {_short(stored.get(name))}, now {_short(again.get(name))}" for name in names)
 
 

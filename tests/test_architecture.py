@@ -17,7 +17,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 # `episode` stands above the simulator although it is filled after it: it is a record of numpy arrays, and physics and
 # task share its Outcome and Partner.
 ROWS = (
-    {"resources", "geometry", "config", "files", "processes", "slots"},
+    {"resources", "elementary", "geometry", "config", "files", "processes", "slots"},
     {"recordings"},
     {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
     {"cast", "scene", "scene_index", "touch", "physics", "sample", "collision", "entrance", "task", "environment"},
@@ -35,7 +35,7 @@ ROWS = (
 # A study uses what all studies share, and no other study.
 STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}
 # Controllers own no simulator: most rows above are closed to them.
-CONTROLLERS_MAY_IMPORT = {"resources", "geometry", "config", "observation", "features", "controllers"}
+CONTROLLERS_MAY_IMPORT = {"resources", "elementary", "geometry", "config", "observation", "features", "controllers"}
 # `socialnav_mj.load` imports `tasks` when it is called.
 EXCEPTIONS = {("socialnav_mj", "tasks")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
@@ -240,6 +240,34 @@ def test_no_module_but_the_command_reads_the_current_directory():
         if isinstance(node, ast.Attribute) and node.attr in {"cwd", "getcwd", "getcwdb"}
     ]
     assert not wrong, wrong
+
+
+# Whose last bit numpy or BLAS chooses by the processor; `elementary` and `np.einsum` stand for them.
+PROCESSORS_OWN = {
+    *("exp", "tanh", "sin", "cos", "tan", "arctan2", "arctan", "arcsin", "arccos", "log", "expm1", "log1p", "power"),
+    *("sinh", "cosh", "cbrt", "exp2", "log2", "log10", "dot", "matmul", "inner", "vdot", "tensordot"),
+}
+STATES_DEPEND_ON = {
+    *("geometry", "recordings", "observation", "features", "cast", "sample", "entrance", "slots", "touch", "physics"),
+    *("task", "environment", "controllers", "rollout", "human"),
+}
+
+
+def test_what_states_depend_on_rounds_alike_on_every_processor():
+    wrong = []
+    for module, path, tree in sources():
+        if room_of(module) not in STATES_DEPEND_ON or module.endswith((".check", ".facts", ".companions")):
+            continue
+        for node in ast.walk(tree):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
+                wrong.append(f"{path.relative_to(ROOT)}:{node.lineno} @")
+            elif isinstance(node, ast.Attribute) and dotted(node.value) in {"np", "numpy"}:
+                wrong += [f"{path.relative_to(ROOT)}:{node.lineno} np.{node.attr}"] * (node.attr in PROCESSORS_OWN)
+            elif isinstance(node, ast.Call) and dotted(node.func) == "np.linalg.norm":
+                # Without an axis it is a product of BLAS's.
+                flat = "axis" not in {keyword.arg for keyword in node.keywords}
+                wrong += [f"{path.relative_to(ROOT)}:{node.lineno} np.linalg.norm without axis"] * flat
+    assert not wrong, "\n".join(wrong)
 
 
 def test_git_carries_no_large_file_outside_the_known_places():

@@ -66,6 +66,21 @@ def write_altered(run: Path, target: Path, **changes: Any) -> Path:
     return replace(Episode.load(run / "episodes" / EPISODE), **changes).save(target)
 
 
+def test_file_of_another_platform_may_agree_and_is_told_where_it_does_not(run: Path, tmp_path: Path) -> None:
+    """An episode of before platforms were noted says none."""
+    metadata = Episode.load(run / "episodes" / EPISODE).metadata
+    now = metadata["platform"]["c_library"]
+    assert "x86" not in now and now != "unknown"
+    elsewhere = {**metadata, "platform": {**metadata["platform"], "c_library": "glibc 2.0"}}
+    silent = {name: value for name, value in metadata.items() if name != "platform"}
+    found = [
+        next(iter(verify(write_altered(run, tmp_path / f"{number}.npz", metadata=given), dataset=TINY, n_jobs=1)))
+        for number, given in enumerate((metadata, elsewhere, silent))
+    ]
+    assert all(verdict.same for verdict in found), found
+    assert [v.other_versions for v in found] == [(), (f"c_library: glibc 2.0, {now}",), ()]
+
+
 def alterations(episode: Episode) -> dict[str, dict[str, Any]]:
     """One change for each thing that an episode says; all keep its invariants."""
     metadata = episode.metadata

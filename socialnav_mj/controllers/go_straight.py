@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from socialnav_mj.controllers.base import Observation, TwistController
+from socialnav_mj.elementary import arctan2, cos
 from socialnav_mj.geometry import Array
 
 
@@ -24,6 +25,6 @@ class GoStraight(TwistController):
             Shape (n_agents, 2) [m/s], [rad/s].
         """
         goal = observation["goal"]
-        bearing = np.arctan2(goal[:, 1], goal[:, 0])
-        speed = self.limits.max_speed * np.maximum(np.cos(bearing), 0.0)
+        bearing = arctan2(goal[:, 1], goal[:, 0])
+        speed = self.limits.max_speed * np.maximum(cos(bearing), 0.0)
         return np.stack([speed, bearing / self.limits.control_timestep], axis=1)

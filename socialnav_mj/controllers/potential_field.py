@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Observation, TwistController
+from socialnav_mj.elementary import arctan2
 from socialnav_mj.geometry import Array
 
 MINIMUM_DISTANCE = 0.05
@@ -78,7 +79,7 @@ def speed_and_turn(force: Array) -> tuple[Array, Array]:
     Returns:
         Speed s_f >= 0, not yet limited, and change of heading theta_fx in [-pi, pi] [rad], both of shape (n_agents,).
     """
-    turn = np.arctan2(force[:, 1], force[:, 0])
+    turn = arctan2(force[:, 1], force[:, 0])
     speed = np.maximum(force[:, 0], 0.0) / np.maximum(np.abs(turn) / np.pi, MINIMUM_TURN)
     return speed, turn
 

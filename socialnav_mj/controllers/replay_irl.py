@@ -12,6 +12,7 @@ from safetensors.numpy import load
 
 from socialnav_mj.controllers.base import Observation, TwistController
 from socialnav_mj.controllers.policy_card import PolicyError, read_card
+from socialnav_mj.elementary import tanh
 from socialnav_mj.features import N_FLAGS, FeatureSet, feature_set, running_state, view_of
 from socialnav_mj.geometry import Array
 from socialnav_mj.resources import assets_folder
@@ -48,7 +49,7 @@ class TrainedPolicy:
         Returns:
             (speed, turn) in [-1, 1], shape (n, 2).
         """
-        return np.tanh(_forward(self.actor, state))
+        return tanh(_forward(self.actor, state))
 
     def reward_of(self, state: Array) -> Array:
         """Learned reward.
@@ -59,15 +60,17 @@ class TrainedPolicy:
         Returns:
             Shape (n,), in (-1, 1).
         """
-        reward: Array = np.tanh(_forward(self.reward, state))[:, 0]
+        reward: Array = tanh(_forward(self.reward, state))[:, 0]
         return reward
 
 
 def _forward(layers: tuple[tuple[Array, Array], ...], values: Array) -> Array:
-    for weight, bias in layers[:-1]:
-        values = np.maximum(values @ weight.T + bias, 0.0)
-    weight, bias = layers[-1]
-    return values @ weight.T + bias
+    for number, (weight, bias) in enumerate(layers, start=1):
+        # Not a matrix product, whose order of summation is BLAS's choice for the processor, see `elementary`.
+        values = np.einsum("ni,oi->no", values, weight) + bias
+        if number < len(layers):
+            values = np.maximum(values, 0.0)
+    return values
 
 
 def policies_folder() -> Path:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from socialnav_mj.elementary import exp
 from socialnav_mj.features.view import HORIZON, View, closest_approach, sector_of
 from socialnav_mj.geometry import Array
 
@@ -43,7 +44,7 @@ class Continuous:
         distance_to_goal = np.hypot(view.goal[:, 0], view.goal[:, 1])
         result[:, :2] = view.goal / np.maximum(distance_to_goal, 1e-9)[:, None]
         result[:, 2] = np.minimum(distance_to_goal, 10.0) / 10.0
-        result[:, 3] = np.exp(-distance_to_goal)
+        result[:, 3] = exp(-distance_to_goal)
         result[:, 4] = view.twist[:, 0]
         result[:, 5] = view.twist[:, 1] / 2.618
         distance = np.hypot(view.position[..., 0], view.position[..., 1])
@@ -56,12 +57,12 @@ class Continuous:
         closing = -np.einsum("kd,kd->k", velocity, ahead)
         tangential = ahead[:, 0] * velocity[:, 1] - ahead[:, 1] * velocity[:, 0]
         time, miss = closest_approach(position, velocity)
-        risk = np.where((closing > 0.0) & (time < HORIZON), np.exp(-time / 2.0 - miss / 0.5), 0.0)
+        risk = np.where((closing > 0.0) & (time < HORIZON), exp(-time / 2.0 - miss / 0.5), 0.0)
         np.maximum.at(result, (agent, 6 + 3 * s + sector), risk)
         # The nearest is written last and stays.
         order = np.argsort(-distance, kind="stable")
         agent, sector = agent[order], sector[order]
-        result[agent, 6 + sector] = np.exp(-distance[order] / 2.0)
+        result[agent, 6 + sector] = exp(-distance[order] / 2.0)
         result[agent, 6 + s + sector] = np.clip(closing[order] / 2.0, -1.0, 1.0)
         result[agent, 6 + 2 * s + sector] = np.clip(tangential[order] / 2.0, -1.0, 1.0)
         return result

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from socialnav_mj.elementary import arctan2
 from socialnav_mj.features.view import HORIZON, View, closest_approach, sector_of
 from socialnav_mj.geometry import Array
 
@@ -43,7 +44,7 @@ then of 8 sectors in the ring from 0.8 to 1.3 m |
         n, s = len(view.goal), self.n_sectors
         result = np.zeros((n, self.size))
         every = np.arange(n)
-        bearing = np.abs(np.arctan2(view.goal[:, 1], view.goal[:, 0])) / np.pi
+        bearing = np.abs(arctan2(view.goal[:, 1], view.goal[:, 0])) / np.pi
         result[every, np.searchsorted([0.125, 0.25, 0.5], bearing, side="right")] = 1.0
         near = np.hypot(view.goal[:, 0], view.goal[:, 1]) < 1.0
         result[every, 4 + np.where(near, s, sector_of(view.goal, s))] = 1.0

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from socialnav_mj.elementary import arctan2
 from socialnav_mj.geometry import Array
 
 HORIZON = 4.0
@@ -82,5 +83,5 @@ def sector_of(position: Array, count: int) -> NDArray[np.int64]:
     Returns:
         Index of the sector, the first centred ahead, counted to the left, shape (...).
     """
-    angle = np.arctan2(position[..., 1], position[..., 0])
+    angle = arctan2(position[..., 1], position[..., 0])
     return np.rint(angle / (2.0 * np.pi / count)).astype(np.int64) % count

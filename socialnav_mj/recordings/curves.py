@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
+from socialnav_mj.elementary import arctan2
 from socialnav_mj.geometry import Array
 
 MOVING_SPEED = 0.1
@@ -100,7 +101,7 @@ class Curves:
         row = np.searchsorted(self._heading_key, key, side="right") - 1
         row = np.clip(row, self._first_heading[people], self._last_heading[people])
         moving = np.hypot(velocity[..., 0], velocity[..., 1]) >= MOVING_SPEED
-        return np.where(moving, np.arctan2(velocity[..., 1], velocity[..., 0]), self._heading[row])
+        return np.where(moving, arctan2(velocity[..., 1], velocity[..., 0]), self._heading[row])
 
     def _tabulate_headings(self) -> None:
         """Table of (time of motion, direction) of every person; people who never move get one row of 0."""
@@ -125,7 +126,7 @@ class Curves:
         moving = np.hypot(velocity[:, 0], velocity[:, 1]) >= MOVING_SPEED
         still = np.setdiff1d(block, people[moving])
         owner = np.concatenate([people[moving], still])
-        direction = np.concatenate([np.arctan2(velocity[moving, 1], velocity[moving, 0]), np.zeros(len(still))])
+        direction = np.concatenate([arctan2(velocity[moving, 1], velocity[moving, 0]), np.zeros(len(still))])
         key = np.concatenate([times[moving], self.start[still]]) - self._origin + owner * self._span
         order = np.argsort(key, kind="stable")
         return key[order], direction[order], owner[order]

@@ -53,7 +53,8 @@ def apply_homography(matrix: Array, pixels: Array, axis_order: AxisOrder) -> Arr
     """
     ordered = pixels if axis_order == "xy" else pixels[:, ::-1]
     with np.errstate(all="ignore"):
-        mapped = np.column_stack([ordered, np.ones(len(ordered))]) @ matrix.T
+        # Sums in a fixed order: a matrix product's last bit is the processor's, see `elementary`.
+        mapped = ordered[:, :1] * matrix[:, 0] + ordered[:, 1:] * matrix[:, 1] + matrix[:, 2]
         return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
