@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
@@ -192,7 +193,7 @@ class Episode:
                 raise EpisodeError(f"it lacks {', '.join(sorted(missing))}")
             if unknown := set(file.files) - expected - {"header"}:
                 raise EpisodeError(f"it has unknown arrays {', '.join(sorted(unknown))}")
-            arrays = {name: file[name] for name in expected}
+            arrays = {name: _array(file, name) for name in expected}
             episode = cls(**arrays, policies=tuple(header["policies"]), metadata=header["metadata"])
             if header.get("digest") != _digest(arrays, header):
                 raise EpisodeError("it was altered after it was written: its contents do not have the header's digest")
@@ -245,7 +246,7 @@ def _reading(path: str | Path) -> Iterator[tuple[Any, dict[str, Any]]]:
                 raise EpisodeError("it has no header")
             if (size := sum(member.file_size for member in file.zip.infolist())) > MAX_BYTES:
                 raise EpisodeError(f"its arrays take {size} bytes; allowed: up to {MAX_BYTES}")
-            header = json.loads(str(file["header"]))
+            header = json.loads(str(_array(file, "header")))
             if header.get("format") != FORMAT:
                 raise EpisodeError(f"its format is {header.get('format')!r}; this version reads {FORMAT!r}")
             if not isinstance(header.get("metadata"), dict) or not _are_names(header.get("policies")):
@@ -260,6 +261,19 @@ def _reading(path: str | Path) -> Iterator[tuple[Any, dict[str, Any]]]:
 
 def _are_names(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+def _array(file: Any, name: str) -> NDArray[Any]:
+    """An array of an npz file; one that claims more bytes than the file holds is refused before they are asked for."""
+    member = f"{name}.npy"
+    with file.zip.open(member) as part:
+        version = np.lib.format.read_magic(part)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(part)
+    claimed, held = math.prod(shape) * dtype.itemsize, file.zip.getinfo(member).file_size
+    if claimed > held:
+        raise EpisodeError(f"{name} of {claimed} bytes in a file of {held}")
+    return np.asarray(file[name])
 
 
 def _digest(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> str:

@@ -211,6 +211,17 @@ def rewritten(content, **changes):
     return target.getvalue()
 
 
+def test_array_that_claims_more_than_the_file_holds_is_refused_before_memory_is_asked_for(content, tmp_path):
+    array = io.BytesIO()
+    np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)})
+    target = io.BytesIO(rewritten(content, time=None))
+    with zipfile.ZipFile(target, "a") as file:
+        file.writestr("time.npy", array.getvalue() + bytes(80))
+    (tmp_path / "a.npz").write_bytes(target.getvalue())
+    with pytest.raises(EpisodeError, match=r"time of 8000000000000 bytes in a file of 208"):
+        Episode.load(tmp_path / "a.npz")
+
+
 def header_of(content, **changes):
     with zipfile.ZipFile(io.BytesIO(content)) as file:
         header = json.loads(str(np.load(io.BytesIO(file.read("header.npy")))))
