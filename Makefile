@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 OUT ?= runs/demo
+SECONDS ?= 600
+SEED ?= 0
 
 BIN := $(VENV)/bin
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
@@ -18,12 +20,13 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lint format clean python-version
+.PHONY: help demo test slow fuzz lint format clean python-version
 
 help:
 	@echo "make demo     run the four scenarios on the embedded recording; results in $(OUT)"
 	@echo "make test     lint, then the tests"
 	@echo "make slow     the longer checks"
+	@echo "make fuzz     feed damaged files to every reader for SECONDS=$(SECONDS) on all cores"
 	@echo "make lint     format check, lint, types"
 	@echo "make format   format and mend what can be mended"
 	@echo "make clean    remove the environment and the caches, not the results"
@@ -39,6 +42,9 @@ test: lint
 
 slow: $(ALL)
 	$(BIN)/python -m pytest -m slow
+
+fuzz: $(ALL)
+	$(BIN)/python -m tests.fuzz.run --seconds $(SECONDS) --seed $(SEED)
 
 lint: $(ALL)
 	$(BIN)/ruff format --check .
