@@ -17,8 +17,10 @@ import pytest
 
 from socialnav_mj.recordings import catalogue as module
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.recordings.catalogue import CatalogueRow, catalogue, catalogue_row
+from socialnav_mj.recordings.catalogue import CatalogueRow, catalogue, catalogue_row, read_catalogue
 from socialnav_mj.recordings.fetch import FetchError, fetch, fetch_row
+from socialnav_mj.recordings.fields import FormatError
+from socialnav_mj.resources import data_folder
 
 CONTENT = b"0 1 0 0\n10 1 1 0\n" * 1000
 needs_ucy = pytest.mark.skipif(
@@ -74,6 +76,53 @@ def test_catalogue_says_all_that_is_needed_of_each_recording() -> None:
         assert row.url is None or (row.url.startswith("https://") and row.url.endswith("/"))
         for files in row.variants.values():
             assert all(len(digest) == 64 for digest in files.values())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "frame_rate = 25.0",
+            "frame_rate = nan",
+            "frame_rate of the recording 'plaza' is not allowed; expected a number",
+        ),
+        ("frame_rate = 25.0", "frame_rate = true", "frame_rate of the recording"),
+        (
+            'folder = "plaza"',
+            'folder = "../elsewhere"',
+            "folder of the recording 'plaza' is not allowed; expected a path",
+        ),
+        ('folder = "plaza"', 'folder = "/etc"', "folder of the recording 'plaza' is not allowed"),
+        ('folder = "plaza"', 'url = "http://a/"\nfolder = "plaza"', "url of the recording .* expected https://"),
+        (
+            'axis_order = "xy"',
+            'axis_order = ["xy"]',
+            "axis_order of the recording 'plaza' is not allowed; expected xy or",
+        ),
+        ('axis_order = "xy"', "", "the set of fields of the recording 'plaza' is not allowed; expected axis_order, "),
+        (
+            "[plaza.variants.vsp]",
+            "[plaza.variants.csv]",
+            "variant csv of the recording 'plaza' is not allowed; expected v",
+        ),
+        (
+            '"H.txt" = "60e5',
+            '"../H.txt" = "60e5',
+            "vsp of the recording 'plaza' is not allowed; expected file names with",
+        ),
+        ('"H.txt" = "60e5', '"H.txt" = "60eX', "vsp of the recording 'plaza' is not allowed"),
+        ("[plaza]", "[plaza", r"no TOML \(Expected"),
+        ("frame_rate = 25.0", "frame_rate = " + "[" * 10_000, r"no TOML \(maximum recursion"),
+    ],
+)
+def test_catalogue_with_a_wrong_field_is_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
+    text = (data_folder() / "catalogue.toml").read_text()
+    text = text[text.index("[plaza]") :]
+    assert old in text
+    path = tmp_path / "catalogue.toml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(FormatError, match=message):
+        read_catalogue(path)
 
 
 def test_unknown_names_list_what_exists() -> None:

@@ -2,18 +2,20 @@
 
 import logging
 import os
+import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pooch
 
+from socialnav_mj.recordings.fields import FormatError, shown, text_lines
 from socialnav_mj.recordings.plausibility import doubts
 from socialnav_mj.recordings.readers import Variant, read_recording, sha256, source_files
-from socialnav_mj.recordings.reading import DEFAULT_READING, AxisOrder, Reading
+from socialnav_mj.recordings.reading import DEFAULT_READING, FRAME_RATES, AxisOrder, Reading
 from socialnav_mj.recordings.recording import Recording
 from socialnav_mj.resources import data_folder
 
@@ -52,9 +54,56 @@ def catalogue() -> Mapping[str, CatalogueRow]:
     Returns:
         Rows in the order of the file.
     """
-    with (data_folder() / "catalogue.toml").open("rb") as file:
-        rows = tomllib.load(file)
-    return {name: CatalogueRow(name=name, **{"url": None, **row}) for name, row in rows.items()}
+    return read_catalogue(data_folder() / "catalogue.toml")
+
+
+def read_catalogue(path: Path) -> dict[str, CatalogueRow]:
+    """Read a catalogue.
+
+    Args:
+        path: A TOML file with a table a recording, whose keys are the fields of `CatalogueRow`.
+
+    Returns:
+        Rows in the order of the file.
+
+    Raises:
+        FormatError: If it is something else, or a field is not what it should be.
+    """
+    try:
+        rows = tomllib.loads("\n".join(text_lines(path)))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise FormatError(path, None, f"no TOML ({shown(str(error))})", "a table a recording") from None
+    return {name: _row(path, name, {"url": None, **row} if isinstance(row, dict) else {}) for name, row in rows.items()}
+
+
+def _row(path: Path, name: str, values: dict[str, Any]) -> CatalogueRow:
+    def require(holds: bool, what: str, expected: str) -> None:
+        if not holds:
+            raise FormatError(path, None, f"{what} of the recording '{shown(name)}' is not allowed", expected)
+
+    wanted = {field.name for field in fields(CatalogueRow)} - {"name"}
+    require(values.keys() == wanted, "the set of fields", ", ".join(sorted(wanted)))
+    for key in ("title", "folder", "source", "licence", "scale"):
+        require(isinstance(values[key], str), key, "a text")
+    require(_is_below(values["folder"]), "folder", "a path below the data directory")
+    url, rate = values["url"], values["frame_rate"]
+    require(url is None or (isinstance(url, str) and url.startswith("https://")), "url", "https://...")
+    is_number = isinstance(rate, float | int) and not isinstance(rate, bool)
+    require(is_number and FRAME_RATES[0] <= rate <= FRAME_RATES[1], "frame_rate", "a number of Hz")
+    require(values["axis_order"] in get_args(AxisOrder), "axis_order", " or ".join(get_args(AxisOrder)))
+    variants = values["variants"]
+    require(isinstance(variants, dict) and bool(variants), "variants", "a table a variant")
+    for variant, files in variants.items():
+        require(variant in get_args(Variant), f"variant {shown(variant)}", ", ".join(get_args(Variant)))
+        require(isinstance(files, dict) and bool(files), variant, "file names with their sha256")
+        for file, digest in files.items():
+            plain = "/" not in file and _is_below(file)
+            require(plain and bool(re.fullmatch("[0-9a-f]{64}", str(digest))), variant, "file names with their sha256")
+    return CatalogueRow(name=name, **values)
+
+
+def _is_below(path: str) -> bool:
+    return path.isprintable() and bool(path) and not Path(path).is_absolute() and ".." not in Path(path).parts
 
 
 def catalogue_row(name: str) -> CatalogueRow:

@@ -92,6 +92,21 @@ def _vsp(rows: list[Row]) -> str:
     return "\n".join([*lines, "0 - the number of obstacles", ""])
 
 
+def _catalogue() -> list[bytes]:
+    from socialnav_mj.resources import data_folder
+
+    return [(data_folder() / "catalogue.toml").read_bytes()]
+
+
+def _read_catalogue(content: bytes, folder: Path) -> None:
+    from socialnav_mj.recordings.catalogue import read_catalogue
+
+    path = folder / "catalogue.toml"
+    path.write_bytes(content)
+    for row in read_catalogue(path).values():
+        assert (folder / row.folder).resolve().is_relative_to(folder.resolve()), "a folder elsewhere"
+
+
 RECORDINGS = (
     _recording("text", ".txt", _text),
     _recording("table", ".csv", _csv, _remarks),
@@ -104,4 +119,5 @@ RECORDINGS = (
         read=_read_homography,
         refuses=_reading_errors,
     ),
+    Target(name="readers/catalogue", seeds=_catalogue, read=_read_catalogue, refuses=_reading_errors),
 )
