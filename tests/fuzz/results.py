@@ -20,7 +20,7 @@ def _episode() -> bytes:
     from socialnav_mj.human import human_episode
     from socialnav_mj.recordings import load_recording
 
-    episode = human_episode(load_recording(TINY), Scenario(share=0.5), scenario_name="scenario_2")
+    episode = human_episode(load_recording(TINY), Scenario(share=0.5), scenario_name="half")
     with TemporaryDirectory() as folder:
         return episode.save(Path(folder) / "a.npz").read_bytes()
 
@@ -158,11 +158,11 @@ def _command_errors() -> tuple[type[Exception], ...]:
 
 
 def _read_run_file(content: bytes, folder: Path) -> None:
-    from socialnav_mj.analysis import report
+    from socialnav_mj.report.run_file import read_run_file
 
     path = folder / "run.json"
     path.write_bytes(content)
-    report._read_run_file(path)
+    read_run_file(path)
 
 
 RESULTS = (
@@ -174,7 +174,9 @@ RESULTS = (
     Target(name="tables/parquet", seeds=lambda: [_table()], read=_read_table, refuses=_command_errors),
     Target(
         name="tables/run.json",
-        seeds=lambda: [json.dumps({"command": "socialnav-mj evaluate", "controllers": ["a", "human"]}).encode()],
+        seeds=lambda: [
+            json.dumps({"command": "socialnav-mj evaluate", "controllers": ["a"], "episodes": ["a.npz"]}).encode()
+        ],
         read=_read_run_file,
         refuses=_command_errors,
     ),
