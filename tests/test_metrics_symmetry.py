@@ -3,6 +3,7 @@
 from dataclasses import fields, replace
 
 import numpy as np
+from declarations import broken
 from episodes import Agent, Pedestrian, Touch, build_episode
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -121,3 +122,13 @@ def test_metrics_stay_in_their_ranges_and_keep_their_identities(cast):
     assert not np.any(values["mean_acceleration"] > values["maximum_acceleration"] + 1e-9)
     under_way = values["arrived"].astype(int) + values["completion_censored"] + values["never_spawned"]
     assert np.all(under_way == 1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(cast=casts())
+def test_metrics_keep_their_declared_type_range_and_nan_rule(cast):
+    episode = build(cast)
+    # Some of the touches are with somebody who is not there: no real contact is without velocities.
+    velocities = ("contact_agent_velocity", "contact_partner_velocity")
+    episode = replace(episode, **{name: np.nan_to_num(getattr(episode, name)) for name in velocities})
+    assert [line for metric in metrics.METRICS for line in broken(metric, episode)] == []

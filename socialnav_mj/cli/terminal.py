@@ -7,18 +7,19 @@ from rich.table import Table
 from rich.text import Text
 
 from socialnav_mj.cli.console import console
-from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report import columns as col
+from socialnav_mj.report.estimates import MEASURES, Estimate
 from socialnav_mj.report.page import by_scenario, with_error
 
 _COLUMNS = (
-    ("success", "success", 3),
-    ("hit by\npeople", "first_hit_pedestrian", 3),
-    ("hit by\nagent", "first_hit_agent", 3),
-    ("timed\nout", "timed_out", 3),
-    ("time\n[s]", "time_under_way", 1),
-    ("path\nratio", "distance_to_displacement", 2),
-    ("steps\n<1.2 m", "intimate_intrusions", 1),
-    ("speed\n[m/s]", "average_speed", 2),
+    col.SUCCESS,
+    col.FIRST_HIT_PEDESTRIAN,
+    col.FIRST_HIT_AGENT,
+    col.TIMED_OUT,
+    col.TIME_UNDER_WAY,
+    col.DISTANCE_TO_DISPLACEMENT,
+    col.INTIMATE_INTRUSIONS,
+    col.AVERAGE_SPEED,
 )
 """Fewer, for 80 characters; the first alone shows its error."""
 
@@ -42,11 +43,12 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
             padding=0,
         )
         table.add_column("controller", overflow="fold")
-        for heading, _, _ in _COLUMNS:
-            table.add_column(Text(heading), justify="right")
+        shown = [MEASURES[name] for name in _COLUMNS]
+        for measure in shown:
+            table.add_column(Text(measure.narrow_heading), justify="right")
         for controller, own in rows:
-            means = [f"{own[measure].mean:.{digits}f}" for _, measure, digits in _COLUMNS[1:]]
-            table.add_row(Text(controller), with_error(own["success"], _COLUMNS[0][2]), *means)
+            means = [f"{own[measure.name].mean:.{measure.narrow_digits}f}" for measure in shown[1:]]
+            table.add_row(Text(controller), with_error(own[shown[0].name], shown[0].narrow_digits), *means)
         tables.append(table)
     return tables
 

@@ -1,9 +1,13 @@
 """Collisions of each agent, by partner; a collision is one contact row: a touch that begins after being apart."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.episode import Episode, Partner
+from socialnav_mj.metrics.metric import Better, Kind, Mean, Metric, Need
+from socialnav_mj.metrics.missing import NEVER
 
 NOBODY = -1
 """Value of `first_partner` for agents that touched nobody."""
@@ -57,3 +61,45 @@ def counted_contacts(episode: Episode) -> NDArray[np.bool_]:
         Shape (k,).
     """
     return episode.contact_time <= episode.agent_end_time[episode.contact_agent] + _SAME_TIME
+
+
+METRICS = (
+    Metric(
+        name="collisions_pedestrian",
+        function=partial(collisions, partner=Partner.PEDESTRIAN),
+        kind=Kind.COUNT,
+        better=Better.LESS,
+        missing=NEVER,
+        needs=(Need.CONTACTS,),
+        formula="contacts with people: a pair that touches after having been apart for 0.2 s",
+        source="HuNavSim: every step and person within 2 cm; contact *points* triple a flat touch",
+    ),
+    Metric(
+        name="collisions_agent",
+        function=partial(collisions, partner=Partner.AGENT),
+        kind=Kind.COUNT,
+        better=Better.LESS,
+        missing=NEVER,
+        needs=(Need.CONTACTS,),
+        formula="contacts with other agents; each of the two counts one",
+    ),
+    Metric(
+        name="first_partner",
+        function=first_partner,
+        kind=Kind.NAME,
+        names={int(partner): partner.name.lower() for partner in Partner},
+        better=Better.NEITHER,
+        missing=NEVER,
+        needs=(Need.CONTACTS,),
+        means=(
+            Mean(
+                name="first_hit_pedestrian",
+                heading="hit first by a pedestrian",
+                share_of="pedestrian",
+                narrow="hit by\npeople",
+            ),
+            Mean(name="first_hit_agent", heading="hit first by an agent", share_of="agent", narrow="hit by\nagent"),
+        ),
+        formula="kind of the first partner; -1: nobody",
+    ),
+)

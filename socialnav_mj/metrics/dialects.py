@@ -24,18 +24,15 @@ from socialnav_mj.metrics.kinematics import (
 )
 from socialnav_mj.metrics.navigation import (
     active_steps,
-    arrived,
     average_speed,
     completion_steps,
     completion_time,
     displacement,
     distance_to_displacement,
-    never_spawned,
     path_length,
-    success,
     time_under_way,
-    timed_out,
 )
+from socialnav_mj.metrics.outcomes import arrived, never_spawned, success, timed_out
 from socialnav_mj.metrics.pairs import Pairs, largest_over, mean_over, pairs, radii
 from socialnav_mj.metrics.path import failures_to_progress
 from socialnav_mj.metrics.proxemics import ZONES, space_compliance

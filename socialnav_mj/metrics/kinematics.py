@@ -4,7 +4,9 @@ import numpy as np
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
-from socialnav_mj.metrics.navigation import never_spawned
+from socialnav_mj.metrics.metric import Better, Metric, Need
+from socialnav_mj.metrics.missing import FEWER_THAN_2_SAMPLES, FEWER_THAN_3_SAMPLES, NEVER_SPAWNED
+from socialnav_mj.metrics.outcomes import never_spawned
 from socialnav_mj.metrics.pairs import largest_over, mean_over
 
 STANDING_SPEED = 0.1
@@ -139,3 +141,86 @@ def _mean(values: Array) -> Array:
 
 def _largest(values: Array) -> Array:
     return largest_over(values, np.isfinite(values))
+
+
+METRICS = (
+    Metric(
+        name="maximum_speed",
+        function=maximum_speed,
+        unit="m/s",
+        low=0.0,
+        better=Better.NEITHER,
+        missing=NEVER_SPAWNED,
+        needs=(Need.VELOCITY,),
+        formula="max |v|, spawn to end",
+        source="Francis 2023, V_max; pushed robots exceed 1 m/s",
+    ),
+    Metric(
+        name="maximum_tilt",
+        function=maximum_tilt,
+        unit="rad",
+        low=0.0,
+        high=np.pi,
+        better=Better.LESS,
+        missing=NEVER_SPAWNED,
+        needs=(Need.TILT,),
+        formula="max angle between mast and vertical, spawn to end",
+        source="ours; 0 in the human row",
+    ),
+    Metric(
+        name="mean_acceleration",
+        function=mean_acceleration,
+        unit="m/s^2",
+        low=0.0,
+        better=Better.LESS,
+        missing=FEWER_THAN_2_SAMPLES,
+        needs=(Need.VELOCITY,),
+        formula="mean |v(k+1) - v(k)| / dt",
+        source="vector; HuNavSim takes the signed change of speed, which telescopes to (v_end - v_start) / T",
+    ),
+    Metric(
+        name="maximum_acceleration",
+        function=maximum_acceleration,
+        unit="m/s^2",
+        low=0.0,
+        better=Better.LESS,
+        missing=FEWER_THAN_2_SAMPLES,
+        needs=(Need.VELOCITY,),
+        formula="max of the same",
+        source="Francis 2023, A_max",
+    ),
+    Metric(
+        name="mean_jerk",
+        function=mean_jerk,
+        unit="m/s^3",
+        low=0.0,
+        better=Better.LESS,
+        missing=FEWER_THAN_3_SAMPLES,
+        needs=(Need.VELOCITY,),
+        formula="mean |v(k+2) - 2 v(k+1) + v(k)| / dt^2",
+        source="HuNavSim divides the acceleration once more by dt, without a difference",
+    ),
+    Metric(
+        name="maximum_jerk",
+        function=maximum_jerk,
+        unit="m/s^3",
+        low=0.0,
+        better=Better.LESS,
+        missing=FEWER_THAN_3_SAMPLES,
+        needs=(Need.VELOCITY,),
+        formula="max of the same",
+        source="Francis 2023, J_max",
+    ),
+    Metric(
+        name="time_not_moving",
+        function=time_not_moving,
+        unit="s",
+        low=0.0,
+        digits=1,
+        better=Better.LESS,
+        missing=NEVER_SPAWNED,
+        needs=(Need.VELOCITY,),
+        formula="dt times steps with |v| < 0.1 m/s, at most T",
+        source="HuNavSim: < 0.001 m/s and < 0.01 rad/s; Francis 2023 leaves it open. Robots start from rest",
+    ),
+)

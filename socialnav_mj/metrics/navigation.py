@@ -1,76 +1,12 @@
-"""Did it arrive, when, how directly and how fast: the paper's metrics 1-3 and its average speed."""
+"""When, how directly and how fast: the paper's metrics 2 and 3 and its average speed."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from socialnav_mj.episode import Episode, Outcome
+from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
-from socialnav_mj.metrics.collisions import collisions
-
-BoolArray = NDArray[np.bool_]
-
-
-def arrived(episode: Episode) -> BoolArray:
-    """Whether each agent came within the goal radius before its deadline, collisions or not.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,); False for agents that never spawned.
-    """
-    return episode.agent_outcome == Outcome.ARRIVED
-
-
-def success(episode: Episode) -> BoolArray:
-    """Successful completion (paper metric 1): arrived, and touched nobody on the way.
-
-    One touch of a pedestrian or of another agent voids it, whoever was at fault, whatever `on_collision` says. The
-    mean over all agents, those that never spawned included, is the paper's "fraction of runs".
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,).
-    """
-    return arrived(episode) & (collisions(episode) == 0)
-
-
-def timed_out(episode: Episode) -> BoolArray:
-    """Whether each agent's deadline passed before it arrived.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,).
-    """
-    return episode.agent_outcome == Outcome.TIMED_OUT
-
-
-def never_spawned(episode: Episode) -> BoolArray:
-    """Whether each agent's place was never free.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,).
-    """
-    return episode.agent_outcome == Outcome.NEVER_SPAWNED
-
-
-def overturned(episode: Episode) -> BoolArray:
-    """Whether each agent ended on its side or back.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,).
-    """
-    return episode.agent_outcome == Outcome.OVERTURNED
+from socialnav_mj.metrics.metric import Better, Kind, Mean, Metric, Need
+from socialnav_mj.metrics.missing import NEVER, NEVER_SPAWNED, NO_STEP, NOT_ARRIVED, Missing
+from socialnav_mj.metrics.outcomes import BoolArray, arrived, never_spawned
 
 
 def spawn_delay(episode: Episode) -> Array:
@@ -137,18 +73,6 @@ def time_under_way(episode: Episode) -> Array:
     return np.where(never_spawned(episode), np.nan, active_steps(episode) * episode.control_timestep)
 
 
-def completion_censored(episode: Episode) -> BoolArray:
-    """Whether an agent spawned and its run ended otherwise than by arrival.
-
-    Args:
-        episode: The record.
-
-    Returns:
-        Shape (n_agents,).
-    """
-    return ~arrived(episode) & ~never_spawned(episode)
-
-
 def path_length(episode: Episode) -> Array:
     """Length of the path traced from spawn to end: the sum of the chords between samples.
 
@@ -203,3 +127,125 @@ def average_speed(episode: Episode) -> Array:
     """
     duration = active_steps(episode) * episode.control_timestep
     return np.divide(path_length(episode), duration, out=np.full_like(duration, np.nan), where=duration > 0.0)
+
+
+def _not_arrived_or_at_goal(episode: Episode) -> BoolArray:
+    return NOT_ARRIVED.where(episode) | np.all(episode.agent_goal == episode.agent_start, axis=-1)
+
+
+METRICS = (
+    Metric(
+        name="completion_time",
+        function=completion_time,
+        unit="s",
+        low=0.0,
+        digits=1,
+        better=Better.LESS,
+        missing=NOT_ARRIVED,
+        means=(Mean(), Mean(name="completion_time_success", heading="time of successes", successes=True)),
+        paired=True,
+        formula="T of those that arrived",
+        source="paper 2; the people have no deadline",
+    ),
+    Metric(
+        name="completion_steps",
+        function=completion_steps,
+        unit="steps",
+        kind=Kind.COUNT,
+        digits=1,
+        better=Better.LESS,
+        missing=NOT_ARRIVED,
+        means=(Mean(), Mean(name="completion_steps_success", heading="steps of successes", successes=True)),
+        formula="n of those that arrived (*rate*)",
+        source="paper 2",
+    ),
+    Metric(
+        name="time_under_way",
+        function=time_under_way,
+        unit="s",
+        low=0.0,
+        heading="time, censored",
+        digits=1,
+        better=Better.LESS,
+        missing=NEVER_SPAWNED,
+        means=(Mean(narrow="time\n[s]"),),
+        formula="T of all; a lower bound where `completion_censored`",
+        source="censored time",
+    ),
+    Metric(
+        name="active_steps",
+        function=active_steps,
+        unit="steps",
+        kind=Kind.COUNT,
+        digits=1,
+        better=Better.NEITHER,
+        missing=NEVER,
+        means=(),
+        formula="n (*rate*)",
+        source="ours",
+    ),
+    Metric(
+        name="displacement",
+        function=displacement,
+        unit="m",
+        low=0.0,
+        digits=2,
+        better=Better.NEITHER,
+        missing=NEVER,
+        needs=(Need.GOAL,),
+        means=(),
+        formula="|g - s|",
+    ),
+    Metric(
+        name="path_length",
+        function=path_length,
+        unit="m",
+        low=0.0,
+        digits=2,
+        better=Better.LESS,
+        missing=NEVER_SPAWNED,
+        needs=(Need.POSITION,),
+        means=(),
+        paired=True,
+        formula="sum |x(k+1) - x(k)|, spawn to end",
+        source="SEAN samples it at 1 Hz, which cuts corners",
+    ),
+    Metric(
+        name="distance_to_displacement",
+        function=distance_to_displacement,
+        low=0.0,
+        heading="path / displacement",
+        better=Better.LESS,
+        missing=Missing(rule="not arrived, or g = s", where=_not_arrived_or_at_goal),
+        needs=(Need.GOAL, Need.POSITION),
+        means=(
+            Mean(narrow="path\nratio", narrow_digits=2),
+            Mean(name="distance_to_displacement_success", heading="path / displacement of successes", successes=True),
+        ),
+        formula="path_length / |g - s|; a straight run gives 1 - 0.5 m / |g - s|",
+        source="paper 3; SocNavBench's path_length_ratio has failed runs too",
+    ),
+    Metric(
+        name="average_speed",
+        function=average_speed,
+        unit="m/s",
+        low=0.0,
+        heading="speed",
+        better=Better.MORE,
+        missing=NO_STEP,
+        needs=(Need.POSITION,),
+        means=(Mean(narrow="speed\n[m/s]", narrow_digits=2),),
+        formula="path_length / T",
+        source="paper figure 2; HuNavSim averages |v|",
+    ),
+    Metric(
+        name="spawn_delay",
+        function=spawn_delay,
+        unit="s",
+        low=0.0,
+        better=Better.NEITHER,
+        missing=NEVER_SPAWNED,
+        formula="real spawn minus the person's appearance",
+        source="ours",
+    ),
+)

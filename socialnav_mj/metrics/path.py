@@ -1,10 +1,14 @@
 """How purposefully agents go: success weighted by path length, irregularity of heading, failures to progress."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array, wrap_angle
-from socialnav_mj.metrics.navigation import active_steps, displacement, path_length, success
+from socialnav_mj.metrics.metric import Better, Kind, Metric, Need
+from socialnav_mj.metrics.missing import NEVER, NO_STEP, Missing
+from socialnav_mj.metrics.navigation import active_steps, displacement, path_length
+from socialnav_mj.metrics.outcomes import success
 from socialnav_mj.metrics.pairs import mean_over
 
 PROGRESS_DISTANCE = 0.5
@@ -72,3 +76,46 @@ def failures_to_progress(episode: Episode) -> Array:
         reference = np.where(nearer | failed, now, reference)
         since = np.where(nearer | failed, step, since)
     return np.where(active_steps(episode) > 0.0, failures, np.nan)
+
+
+def _no_step_off_the_goal(episode: Episode) -> NDArray[np.bool_]:
+    off = np.any(episode.agent_position != episode.agent_goal, axis=-1)
+    return ~(episode.agent_active & off).any(axis=0)
+
+
+METRICS = (
+    Metric(
+        name="spl",
+        function=spl,
+        low=0.0,
+        high=1.0,
+        better=Better.MORE,
+        missing=NEVER,
+        needs=(Need.GOAL, Need.POSITION, Need.CONTACTS),
+        formula="success l / max(path_length, l), l = |g - s|",
+        source="Anderson et al. 2018; Francis 2023 weighs arrival",
+    ),
+    Metric(
+        name="path_irregularity",
+        function=path_irregularity,
+        unit="rad",
+        low=0.0,
+        high=np.pi,
+        better=Better.LESS,
+        missing=Missing(rule="no step off the goal", where=_no_step_off_the_goal),
+        needs=(Need.GOAL, Need.POSITION, Need.HEADING),
+        formula="mean angle between h and g - x",
+        source="SocNavBench takes the *position vector* for h (depends on the map's origin); SEAN sums turns over a "
+        "planned path's",
+    ),
+    Metric(
+        name="failures_to_progress",
+        function=failures_to_progress,
+        kind=Kind.COUNT,
+        better=Better.LESS,
+        missing=NO_STEP,
+        needs=(Need.GOAL, Need.POSITION),
+        formula="how often |x - g| did not fall by 0.5 m within 10 s",
+        source="Francis 2023, FP, thresholds left open; ours are Nav2's",
+    ),
+)

@@ -1,9 +1,13 @@
 """How agents share space with people: mean distance, Hall's zones and space compliance; distances between centres."""
 
+from functools import partial
+
 import numpy as np
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.metric import Better, Metric, Need
+from socialnav_mj.metrics.missing import NO_STEP, NO_STEP_WITH_PEOPLE
 from socialnav_mj.metrics.pairs import mean_over
 from socialnav_mj.metrics.proximity import nearest_pedestrian_distance
 
@@ -65,3 +69,56 @@ def space_compliance(episode: Episode) -> Array:
     """
     complying = nearest_pedestrian_distance(episode) >= COMPLIANT_DISTANCE
     return mean_over(complying.astype(float), episode.agent_active)
+
+
+def _zone_metric(zone: str, *, formula: str, better: Better, source: str = "the same") -> Metric:
+    return Metric(
+        name=f"{zone}_zone_share",
+        function=partial(zone_share, zone=zone),
+        low=0.0,
+        high=1.0,
+        better=better,
+        missing=NO_STEP,
+        needs=(Need.POSITION, Need.PEDESTRIANS),
+        formula=formula,
+        source=source,
+    )
+
+
+METRICS = (
+    Metric(
+        name="mean_distance",
+        function=mean_distance,
+        unit="m",
+        low=0.0,
+        better=Better.MORE,
+        missing=NO_STEP_WITH_PEOPLE,
+        needs=(Need.POSITION, Need.PEDESTRIANS),
+        formula="mean d over steps with somebody in the scene",
+        source="HuNavSim: between surfaces",
+    ),
+    _zone_metric(
+        "intimate",
+        formula="share with d < 0.45 m",
+        better=Better.LESS,
+        source="Hall 1966; HuNavSim measures from the robot's surface",
+    ),
+    _zone_metric("personal", formula="share with 0.45 <= d < 1.2 m", better=Better.LESS),
+    _zone_metric("social", formula="share with 1.2 <= d < 3.6 m", better=Better.NEITHER),
+    _zone_metric(
+        "public",
+        formula="share with d >= 3.6 m or nobody in the scene; the four add up to 1",
+        better=Better.NEITHER,
+    ),
+    Metric(
+        name="space_compliance",
+        function=space_compliance,
+        low=0.0,
+        high=1.0,
+        better=Better.MORE,
+        missing=NO_STEP,
+        needs=(Need.POSITION, Need.PEDESTRIANS),
+        formula="share with d >= 0.5 m: **complying**",
+        source="Francis 2023 prints the share **under** the threshold; our dialect `francis2023` has that",
+    ),
+)

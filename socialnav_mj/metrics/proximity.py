@@ -4,6 +4,8 @@ import numpy as np
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.metric import Better, Kind, Mean, Metric, Need
+from socialnav_mj.metrics.missing import NO_STEP, NO_STEP_WITH_PEOPLE
 from socialnav_mj.metrics.navigation import active_steps
 from socialnav_mj.metrics.pairs import pairs, remember_last
 
@@ -71,3 +73,48 @@ def minimum_distance(episode: Episode) -> Array:
     distance = np.where(episode.agent_active, nearest_pedestrian_distance(episode), np.inf)
     smallest = distance.min(axis=0, initial=np.inf)
     return np.where(np.isfinite(smallest), smallest, np.nan)
+
+
+METRICS = (
+    Metric(
+        name="intimate_intrusions",
+        function=intimate_intrusions,
+        unit="steps",
+        kind=Kind.COUNT,
+        digits=1,
+        better=Better.LESS,
+        missing=NO_STEP,
+        needs=(Need.POSITION, Need.PEDESTRIANS),
+        means=(Mean(narrow="steps\n<1.2 m"),),
+        paired=True,
+        formula="steps with d < 1.2 m (*rate*), at most n",
+        source="paper 4; 1.2 m is Hall's *personal* distance",
+    ),
+    Metric(
+        name="intrusion_share",
+        function=intrusion_share,
+        low=0.0,
+        high=1.0,
+        better=Better.LESS,
+        missing=NO_STEP,
+        needs=(Need.POSITION, Need.PEDESTRIANS),
+        means=(
+            Mean(),
+            Mean(name="intrusion_share_of_steps", heading="share of steps within 1.2 m", weight="active_steps"),
+        ),
+        paired=True,
+        formula="the same / n",
+    ),
+    Metric(
+        name="minimum_distance",
+        function=minimum_distance,
+        unit="m",
+        low=0.0,
+        better=Better.MORE,
+        missing=NO_STEP_WITH_PEOPLE,
+        needs=(Need.POSITION, Need.PEDESTRIANS),
+        paired=True,
+        formula="min d over steps",
+        source="HuNavSim: minus the robot's radius; CrowdNav: between surfaces",
+    ),
+)

@@ -4,6 +4,8 @@ import numpy as np
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.metric import Better, Metric, Need
+from socialnav_mj.metrics.missing import NO_STEP
 from socialnav_mj.metrics.navigation import active_steps
 from socialnav_mj.metrics.pairs import pairs
 
@@ -88,3 +90,18 @@ def summed_social_work(episode: Episode, *, turn: float = 1.0) -> Array:
     np.add.at(on_agent, (near.step, near.agent), force)
     on_people = np.bincount(near.agent, np.linalg.norm(force, axis=-1), minlength=episode.n_agents)
     return np.linalg.norm(on_agent, axis=-1).sum(axis=0) + on_people
+
+
+METRICS = (
+    Metric(
+        name="social_work",
+        function=social_work,
+        unit="m/s",
+        low=0.0,
+        better=Better.LESS,
+        missing=NO_STEP,
+        needs=(Need.POSITION, Need.VELOCITY, Need.PEDESTRIANS),
+        formula="dt sum (|sum_j f_j| + sum_j |f_j|), f_j: Moussaid's force of person j",
+        source="HuNavSim sums over log steps (doubles with the rate) and turns to the other side",
+    ),
+)

@@ -4,6 +4,8 @@ import numpy as np
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.metric import Better, Metric, Need
+from socialnav_mj.metrics.missing import NO_STEP_WITH_PEOPLE
 from socialnav_mj.metrics.pairs import pairs, radii
 
 _STILL = 1e-9
@@ -52,3 +54,21 @@ def minimum_time_to_collision(episode: Episode) -> Array:
     np.minimum.at(smallest, here.agent[here.active], time[here.active])
     seen = np.bincount(here.agent[here.active], minlength=episode.n_agents) > 0
     return np.where(seen, smallest, np.nan)
+
+
+METRICS = (
+    Metric(
+        name="minimum_time_to_collision",
+        function=minimum_time_to_collision,
+        unit="s",
+        low=0.0,
+        infinite=True,
+        better=Better.MORE,
+        missing=NO_STEP_WITH_PEOPLE,
+        needs=(Need.POSITION, Need.VELOCITY, Need.PEDESTRIANS),
+        formula="min over steps and people of the smallest t >= 0 with |dx + dv t| <= 0.32 m; inf: never on collision "
+        "course",
+        source="SocNavBench: along the line of centres, so passing is colliding; Francis 2023: linear motion, bodies "
+        "not specified",
+    ),
+)

@@ -11,78 +11,48 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 import tasks
-from socialnav_mj.episode import Episode, EpisodeError, Partner, check_name
-from socialnav_mj.metrics import ZONES, Fault, Severity, per_agent
+from socialnav_mj.episode import Episode, EpisodeError, check_name
 from socialnav_mj.metrics.contacts import pedestrian_overlaps
+from socialnav_mj.metrics.metric import Kind, Metric
+from socialnav_mj.metrics.registry import METRICS, per_agent
 from socialnav_mj.processes import in_processes
+from socialnav_mj.report import columns as col
 from socialnav_mj.report.collisions import contacts_table
-from socialnav_mj.report.paired import HUMAN, HUMAN_COLUMNS, pair_with_humans
+from socialnav_mj.report.paired import HUMAN, pair_with_humans
 
-SCHEMA = pa.schema(
-    [
-        ("dataset", pa.string()),
-        ("variant", pa.string()),
-        ("scenario", pa.string()),
-        ("share", pa.float64()),
-        ("controller", pa.string()),
-        ("draw", pa.int64()),
-        ("agent", pa.int64()),
-        ("person", pa.int64()),
-        ("success", pa.bool_()),
-        ("arrived", pa.bool_()),
-        ("timed_out", pa.bool_()),
-        ("overturned", pa.bool_()),
-        ("never_spawned", pa.bool_()),
-        ("completion_time", pa.float64()),
-        ("completion_steps", pa.int64()),
-        ("time_under_way", pa.float64()),
-        ("completion_censored", pa.bool_()),
-        ("active_steps", pa.int64()),
-        ("displacement", pa.float64()),
-        ("path_length", pa.float64()),
-        ("distance_to_displacement", pa.float64()),
-        ("average_speed", pa.float64()),
-        ("intimate_intrusions", pa.int64()),
-        ("intrusion_share", pa.float64()),
-        ("minimum_distance", pa.float64()),
-        ("collisions_pedestrian", pa.int64()),
-        ("collisions_agent", pa.int64()),
-        ("first_partner", pa.string()),
-        ("spawn_delay", pa.float64()),
-        ("spl", pa.float64()),
-        ("path_irregularity", pa.float64()),
-        ("failures_to_progress", pa.int64()),
-        ("maximum_speed", pa.float64()),
-        ("maximum_tilt", pa.float64()),
-        ("mean_acceleration", pa.float64()),
-        ("maximum_acceleration", pa.float64()),
-        ("mean_jerk", pa.float64()),
-        ("maximum_jerk", pa.float64()),
-        ("time_not_moving", pa.float64()),
-        ("mean_distance", pa.float64()),
-        *((f"{zone}_zone_share", pa.float64()) for zone in ZONES),
-        ("space_compliance", pa.float64()),
-        ("minimum_time_to_collision", pa.float64()),
-        ("social_work", pa.float64()),
-        *((f"collisions_{kind.name.lower()}_by_{who.name.lower()}", pa.int64()) for kind in Partner for who in Fault),
-        *((f"collisions_{what.name.lower()}", pa.int64()) for what in Severity),
-        ("wedged_collisions", pa.int64()),
-        ("repeated_collisions", pa.int64()),
-        ("struck_standing", pa.bool_()),
-        ("largest_closing_speed", pa.float64()),
-        ("largest_peak_force", pa.float64()),
-        ("human_completion_time", pa.float64()),
-        ("human_path_length", pa.float64()),
-        ("human_intimate_intrusions", pa.int64()),
-        ("human_intrusion_share", pa.float64()),
-        ("human_minimum_distance", pa.float64()),
-        ("episode", pa.string()),
-        ("state_hash", pa.string()),
-    ]
-)
-"""Columns of the agents' table: metrics as `socialnav_mj.metrics` defines them, null where they are NaN; `episode` is
-the file the row comes from, `first_partner` is "pedestrian", "agent" or null, `human_...` are the values of the person
-that the agent replaced (null until paired, or if the run has no human row of that draw)."""
+_TYPES = {Kind.FLAG: pa.bool_(), Kind.COUNT: pa.int64(), Kind.NUMBER: pa.float64(), Kind.NAME: pa.string()}
+
+
+def agents_schema(metrics: Sequence[Metric] = METRICS) -> pa.Schema:
+    """Columns of the agents' table: whose row it is, metrics, what the replaced person had, where it comes from.
+
+    Args:
+        metrics: That have columns; null where the metric is missing.
+
+    Returns:
+        Names and types, metrics in the order of `columns.ORDER`.
+    """
+    ordered = sorted(metrics, key=lambda metric: col.place(metric.name))
+    return pa.schema(
+        [
+            (col.DATASET, pa.string()),
+            (col.VARIANT, pa.string()),
+            (col.SCENARIO, pa.string()),
+            (col.SHARE, pa.float64()),
+            (col.CONTROLLER, pa.string()),
+            (col.DRAW, pa.int64()),
+            (col.AGENT, pa.int64()),
+            (col.PERSON, pa.int64()),
+            *((metric.name, _TYPES[metric.kind]) for metric in ordered),
+            *((col.human(metric.name), _TYPES[metric.kind]) for metric in ordered if metric.paired),
+            (col.EPISODE, pa.string()),
+            (col.STATE_HASH, pa.string()),
+        ]
+    )
+
+
+SCHEMA = agents_schema()
+"""Of a report with all metrics of the project."""
 
 _METADATA = ("controller", "controller_config", "scenario", "scenario_name", "draw", "recording", "state_hash")
 _PARTS = {"recording": ("name", "variant", "checksum"), "scenario": ("seed", "share")}
@@ -115,7 +85,7 @@ class Results:
     """All agents of a run, and the episodes they come from, in the same order."""
 
     agents: pa.Table
-    """Columns of `SCHEMA`, paired with the human row."""
+    """Columns of `agents_schema`, paired with the human row."""
     contacts: pa.Table
     """Columns of `collisions.CONTACT_SCHEMA`."""
     overlaps: dict[tuple[str, str, str], list[float]]
@@ -124,15 +94,16 @@ class Results:
     """One for each episode, even without agents."""
 
 
-def agents_table(episode: Episode, *, file: str = "") -> pa.Table:
+def agents_table(episode: Episode, *, file: str = "", metrics: Sequence[Metric] = METRICS) -> pa.Table:
     """One row for every agent of an episode.
 
     Args:
         episode: The record; its metadata fill the descriptive columns.
         file: Name of its file, for the column `episode`.
+        metrics: That have columns.
 
     Returns:
-        Columns of `SCHEMA`, rows in the order of the agents.
+        Columns of `agents_schema`, rows in the order of the agents, not yet paired.
 
     Raises:
         EpisodeError: If the metadata lack a key that is needed, or contradict themselves.
@@ -141,33 +112,40 @@ def agents_table(episode: Episode, *, file: str = "") -> pa.Table:
     source = Source(file=file, metadata=episode.metadata)
     dataset, variant, scenario, controller = source.group
     n = episode.n_agents
-    metrics = per_agent(episode)
-    values: dict[str, NDArray[Any] | list[Any]] = dict(metrics)
-    names = {int(partner): partner.name.lower() for partner in Partner}
-    values["first_partner"] = [names.get(int(partner)) for partner in metrics["first_partner"]]
-    values |= {"agent": np.arange(n), "person": episode.agent_person}
-    values |= {name: [None] * n for name in HUMAN_COLUMNS}
+    values: dict[str, NDArray[Any] | list[Any]] = dict(per_agent(episode, metrics))
+    for metric in metrics:
+        if metric.kind is Kind.NAME:
+            values[metric.name] = [metric.names.get(int(value)) for value in values[metric.name]]
+        if metric.paired:
+            values[col.human(metric.name)] = [None] * n
+    values |= {col.AGENT: np.arange(n), col.PERSON: episode.agent_person}
     constant = {
-        "dataset": dataset,
-        "variant": variant,
-        "scenario": scenario,
-        "share": float(episode.metadata["scenario"]["share"]),
-        "controller": controller,
-        "draw": source.draw,
-        "episode": file,
-        "state_hash": str(episode.metadata["state_hash"]),
+        col.DATASET: dataset,
+        col.VARIANT: variant,
+        col.SCENARIO: scenario,
+        col.SHARE: float(episode.metadata["scenario"]["share"]),
+        col.CONTROLLER: controller,
+        col.DRAW: source.draw,
+        col.EPISODE: file,
+        col.STATE_HASH: str(episode.metadata["state_hash"]),
     }
-    columns = [
+    schema = agents_schema(metrics)
+    arrays = [
         pa.array([constant[field.name]] * n, field.type)
         if field.name in constant
         else pa.array(values[field.name], from_pandas=True).cast(field.type)
-        for field in SCHEMA
+        for field in schema
     ]
-    return pa.table(columns, schema=SCHEMA)
+    return pa.table(arrays, schema=schema)
 
 
 def read_results(
-    folder: str | Path, *, controllers: Sequence[str] = (), files: Sequence[str] | None = None, n_jobs: int = 1
+    folder: str | Path,
+    *,
+    controllers: Sequence[str] = (),
+    files: Sequence[str] | None = None,
+    metrics: Sequence[Metric] = METRICS,
+    n_jobs: int = 1,
 ) -> Results:
     """Score the episodes of a run; one episode at a time is in the memory of each process.
 
@@ -175,6 +153,7 @@ def read_results(
         folder: The run; its episodes are `episodes/*.npz`.
         controllers: Order of the controllers; others follow alphabetically, the human row is always last.
         files: Names of the episodes to read; all by default.
+        metrics: That have columns.
         n_jobs: Processes that read.
 
     Returns:
@@ -192,7 +171,7 @@ def read_results(
         raise FileNotFoundError(f"no episodes in {episodes}; expected *.npz files")
     if missing := sorted({*paths} - {*there}):
         raise FileNotFoundError(f"{len(missing)} of {len(paths)} episodes are not there, the first is {missing[0]}")
-    read = list(in_processes(_read, [(path,) for path in paths], n_jobs=n_jobs))
+    read = list(in_processes(_read, [(path, metrics) for path in paths], n_jobs=n_jobs))
     places = {name: place for place, name in enumerate(controllers)}
 
     def key(item: tuple[Source, pa.Table, pa.Table, float]) -> tuple[Any, ...]:
@@ -210,18 +189,18 @@ def read_results(
         if source.group[3] == HUMAN and np.isfinite(share):
             overlaps.setdefault(source.group[:3], []).append(share)
     return Results(
-        agents=pair_with_humans(pa.concat_tables([agents for _, agents, _, _ in read])),
+        agents=pair_with_humans(pa.concat_tables([agents for _, agents, _, _ in read]), metrics),
         contacts=pa.concat_tables([contacts for _, _, contacts, _ in read]),
         overlaps=overlaps,
         sources=sources,
     )
 
 
-def _read(path: Path) -> tuple[Source, pa.Table, pa.Table, float]:
+def _read(path: Path, metrics: Sequence[Metric]) -> tuple[Source, pa.Table, pa.Table, float]:
     """An episode's description, agents, collisions, and the share of its pedestrians that overlap another one."""
     episode = Episode.load(path)
     try:
-        agents = agents_table(episode, file=path.name)
+        agents = agents_table(episode, file=path.name, metrics=metrics)
         source = Source(file=path.name, metadata=episode.metadata)
         labels = dict(zip(("dataset", "variant", "scenario", "controller"), source.group, strict=True))
         contacts = contacts_table(episode, labels=labels | {"draw": source.draw}, file=path.name)

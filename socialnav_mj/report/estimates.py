@@ -1,8 +1,7 @@
 """Averages over agents and draws: the draw is the unit, because agents of one draw share a crowd."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
 from socialnav_mj.geometry import Array
+from socialnav_mj.metrics.metric import Mean, Metric
+from socialnav_mj.metrics.registry import METRICS
+from socialnav_mj.report.columns import CONTROLLER, DATASET, DRAW, SCENARIO, SUCCESS, VARIANT, place
 
 CONFIDENCE = 0.95
 MINIMUM_DRAWS = 3
@@ -19,63 +21,80 @@ N_RESAMPLES = 9999
 
 Columns = dict[str, NDArray[Any]]
 
-MEASURES: dict[str, Callable[[Columns], Array]] = {
-    "success": lambda c: c["success"],
-    "timed_out": lambda c: c["timed_out"],
-    "overturned": lambda c: c["overturned"],
-    "never_spawned": lambda c: c["never_spawned"],
-    "first_hit_pedestrian": lambda c: c["first_partner"] == "pedestrian",
-    "first_hit_agent": lambda c: c["first_partner"] == "agent",
-    "completion_time": lambda c: c["completion_time"],
-    "completion_time_success": lambda c: np.where(c["success"] > 0, c["completion_time"], np.nan),
-    "completion_steps": lambda c: c["completion_steps"],
-    "completion_steps_success": lambda c: np.where(c["success"] > 0, c["completion_steps"], np.nan),
-    "time_under_way": lambda c: c["time_under_way"],
-    "distance_to_displacement": lambda c: c["distance_to_displacement"],
-    "distance_to_displacement_success": lambda c: np.where(c["success"] > 0, c["distance_to_displacement"], np.nan),
-    "average_speed": lambda c: c["average_speed"],
-    "intimate_intrusions": lambda c: c["intimate_intrusions"],
-    "intrusion_share": lambda c: c["intrusion_share"],
-    "intrusion_share_of_steps": lambda c: c["intrusion_share"],
-    "minimum_distance": lambda c: c["minimum_distance"],
-    "collisions_pedestrian": lambda c: c["collisions_pedestrian"],
-    "collisions_agent": lambda c: c["collisions_agent"],
-    "spawn_delay": lambda c: c["spawn_delay"],
-    **{
-        name: itemgetter(name)
-        for name in (
-            "spl",
-            "path_irregularity",
-            "failures_to_progress",
-            "maximum_speed",
-            "maximum_tilt",
-            "mean_acceleration",
-            "maximum_acceleration",
-            "mean_jerk",
-            "maximum_jerk",
-            "time_not_moving",
-            "mean_distance",
-            "intimate_zone_share",
-            "personal_zone_share",
-            "social_zone_share",
-            "public_zone_share",
-            "space_compliance",
-            "minimum_time_to_collision",
-            "social_work",
-            "wedged_collisions",
-            "repeated_collisions",
-            "struck_standing",
-            "largest_closing_speed",
-            "largest_peak_force",
-        )
-    },
-}
-"""What is averaged: value of every agent, NaN where it has none. `completion_time` is over arrivals, `..._success` over
+
+@dataclass(frozen=True, kw_only=True)
+class Measure:
+    """What is averaged over agents: a metric, and over whom."""
+
+    metric: Metric
+    mean: Mean
+
+    def __call__(self, columns: Columns) -> Array:
+        """Value of every agent.
+
+        Args:
+            columns: Of the agents' table, each of shape (n,).
+
+        Returns:
+            Shape (n,); NaN where an agent has none or does not count.
+        """
+        values = columns[self.metric.name]
+        if self.mean.share_of:
+            return values == self.mean.share_of
+        return np.where(columns[SUCCESS] > 0, values, np.nan) if self.mean.successes else values
+
+    @property
+    def name(self) -> str:
+        """In summary.csv."""
+        return self.mean.name or self.metric.name
+
+    @property
+    def heading(self) -> str:
+        """In report.md, with the unit in brackets."""
+        label = self.mean.heading or self.metric.label
+        return f"{label} [{self.metric.unit}]" if self.metric.unit else label
+
+    @property
+    def narrow_heading(self) -> str:
+        """In a terminal; one or two lines."""
+        return self.mean.narrow or self.heading
+
+    @property
+    def digits(self) -> int:
+        """Behind the point, in report.md."""
+        return self.metric.digits
+
+    @property
+    def narrow_digits(self) -> int:
+        """Behind the point, in a terminal."""
+        return self.digits if self.mean.narrow_digits is None else self.mean.narrow_digits
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Least and greatest mean."""
+        return (0.0, 1.0) if self.mean.share_of else self.metric.limits
+
+
+def measures_of(metrics: Sequence[Metric]) -> dict[str, Measure]:
+    """All measures that are made of metrics.
+
+    Args:
+        metrics: Of one report.
+
+    Returns:
+        By name, in the order of `columns.ORDER`.
+    """
+    found = [Measure(metric=metric, mean=mean) for metric in metrics for mean in metric.means]
+    return {m.name: m for m in sorted(found, key=lambda m: place(m.name, m.metric.name))}
+
+
+MEASURES = measures_of(METRICS)
+"""What is averaged in a report with all metrics of the project. `completion_time` is over arrivals, `..._success` over
 successes alone, `time_under_way` over everybody who spawned, time-outs censored. `intrusion_share` weighs agents
 equally, `intrusion_share_of_steps` weighs active steps equally. `minimum_time_to_collision` is over agents that were
 ever on collision course, `largest_...` over agents with a collision."""
 
-WEIGHTS: dict[str, str] = {"intrusion_share_of_steps": "active_steps"}
+WEIGHTS = {name: measure.mean.weight for name, measure in MEASURES.items() if measure.mean.weight}
 """Columns that weigh agents within a draw; all others weigh equally."""
 
 
@@ -105,19 +124,20 @@ class Estimate:
     """Why something is missing or special; else empty."""
 
 
-def summarise(agents: pa.Table) -> list[Estimate]:
+def summarise(agents: pa.Table, measures: Mapping[str, Measure] = MEASURES) -> list[Estimate]:
     """Every measure of every controller in every scenario.
 
     Args:
-        agents: Columns of `agents.SCHEMA`.
+        agents: Columns of `agents.agents_schema`.
+        measures: Of the same metrics.
 
     Returns:
-        In the table's order of controllers and scenarios, then in the order of `MEASURES`.
+        In the table's order of controllers and scenarios, then in the order of the measures.
     """
     return [
-        estimate(values, weights, draws, labels={**labels, "measure": measure})
+        estimate(values, weights, draws, labels={**labels, "measure": name})
         for labels, columns, draws in groups(agents)
-        for measure in MEASURES
+        for name, measure in measures.items()
         for values, weights in [measured(columns, measure)]
     ]
 
@@ -199,7 +219,7 @@ def groups(table: pa.Table) -> Iterator[tuple[dict[str, str], Columns, NDArray[n
     Yields:
         What the rows share, their columns (null numbers are NaN) and their draws, in the order of first appearance.
     """
-    names = ("dataset", "variant", "scenario", "controller")
+    names = (DATASET, VARIANT, SCENARIO, CONTROLLER)
     keys = list(zip(*(table[name].to_pylist() for name in names), strict=True))
     rows: dict[tuple[str, ...], list[int]] = {}
     for row, key in enumerate(keys):
@@ -207,18 +227,19 @@ def groups(table: pa.Table) -> Iterator[tuple[dict[str, str], Columns, NDArray[n
     for key, chosen in rows.items():
         part = table.take(chosen)
         columns = {name: part[name].to_numpy() for name in part.column_names}
-        yield dict(zip(names, key, strict=True)), columns, columns["draw"]
+        yield dict(zip(names, key, strict=True)), columns, columns[DRAW]
 
 
-def measured(columns: Columns, measure: str) -> tuple[Array, Array]:
+def measured(columns: Columns, measure: Measure) -> tuple[Array, Array]:
     """A measure of every agent, and the agent's weight within its draw.
 
     Args:
         columns: Of some agents.
-        measure: Key of `MEASURES`.
+        measure: Of a metric that they have.
 
     Returns:
         Both of shape (n,); the value is NaN where there is none.
     """
-    values = np.asarray(MEASURES[measure](columns), dtype=float)
-    return values, columns[WEIGHTS[measure]].astype(float) if measure in WEIGHTS else np.ones_like(values)
+    values = np.asarray(measure(columns), dtype=float)
+    weight = measure.mean.weight
+    return values, columns[weight].astype(float) if weight else np.ones_like(values)

@@ -6,23 +6,24 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
-from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report import columns as col
+from socialnav_mj.report.estimates import MEASURES, Estimate
 from socialnav_mj.report.markdown import bounds, code, head, number, plain, row
 
 _COLUMNS = (
-    ("success", "success", 3),
-    ("hit first by a pedestrian", "first_hit_pedestrian", 3),
-    ("hit first by an agent", "first_hit_agent", 3),
-    ("timed out", "timed_out", 3),
-    ("overturned", "overturned", 3),
-    ("time of successes [s]", "completion_time_success", 1),
-    ("time, censored [s]", "time_under_way", 1),
-    ("path / displacement", "distance_to_displacement", 3),
-    ("intimate intrusions [steps]", "intimate_intrusions", 1),
-    ("share of steps within 1.2 m", "intrusion_share_of_steps", 3),
-    ("speed [m/s]", "average_speed", 3),
+    col.SUCCESS,
+    col.FIRST_HIT_PEDESTRIAN,
+    col.FIRST_HIT_AGENT,
+    col.TIMED_OUT,
+    col.OVERTURNED,
+    col.COMPLETION_TIME_SUCCESS,
+    col.TIME_UNDER_WAY,
+    col.DISTANCE_TO_DISPLACEMENT,
+    col.INTIMATE_INTRUSIONS,
+    col.INTRUSION_SHARE_OF_STEPS,
+    col.AVERAGE_SPEED,
 )
-"""Heading, measure and digits of the columns of report.md; all measures are in summary.csv."""
+"""Measures in report.md; all are in summary.csv."""
 
 _HOW_TO_READ = """\
 Every cell is the mean over draws ± its standard error; a draw is one random choice of the people who are replaced, \
@@ -63,7 +64,8 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
     lines += [f"Command: {code(summary['command'])}" if summary["command"] else "Command: not recorded (no run.json)."]
     lines += ["", "Made from the episode files alone; `socialnav-mj report FOLDER` makes it again.", ""]
     lines += [f"**Warning**: {plain(warning)}.\n" for warning in summary["warnings"]]
-    headings = ["controller", "success", "95 % interval", *(heading for heading, _, _ in _COLUMNS[1:])]
+    shown = [MEASURES[name] for name in _COLUMNS]
+    headings = ["controller", shown[0].heading, "95 % interval", *(measure.heading for measure in shown[1:])]
     for (dataset, variant, scenario), rows in by_scenario(estimates):
         share = next(
             g["scenario_configuration"]["share"]
@@ -73,7 +75,7 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
         lines += [f"## {plain(f'{dataset} ({variant}), {scenario}')}: {100 * share:g} % of the people replaced", ""]
         lines += head([*headings, "draws", "agents"])
         for controller, own in rows:
-            cells = [with_error(own[measure], digits) for _, measure, digits in _COLUMNS]
+            cells = [with_error(own[measure.name], measure.digits) for measure in shown]
             counts = [str(own["success"].n_draws), str(own["success"].n_agents)]
             lines.append(
                 row([controller, cells[0], bounds(own["success"].low, own["success"].high), *cells[1:], *counts])

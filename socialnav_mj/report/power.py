@@ -8,9 +8,10 @@ import numpy as np
 import pyarrow as pa
 from scipy.stats import t as student
 
+from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import CONFIDENCE, MEASURES, Columns, draw_means, groups, measured
 
-TARGETS = {"success": 0.05, "time_under_way": 1.0, "intrusion_share": 0.05, "minimum_distance": 0.05}
+TARGETS = {col.SUCCESS: 0.05, col.TIME_UNDER_WAY: 1.0, col.INTRUSION_SHARE: 0.05, col.MINIMUM_DISTANCE: 0.05}
 """Measures and the differences that the report asks for, in the measure's unit."""
 MOST_DRAWS = 100_000
 
@@ -136,5 +137,5 @@ _PLACE: Sequence[str] = ("dataset", "variant", "scenario")
 
 
 def _draw_means(columns: Columns, measure: str) -> dict[int, float]:
-    unit, means = draw_means(*measured(columns, measure), columns["draw"])
+    unit, means = draw_means(*measured(columns, MEASURES[measure]), columns[col.DRAW])
     return dict(zip(unit.tolist(), means.tolist(), strict=True))

@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.severity import Severity
+from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import Columns, Estimate, groups
 from socialnav_mj.report.markdown import interval, table
 from socialnav_mj.report.paired import DIFFERENCES
@@ -74,7 +75,7 @@ def fault_section(agents: pa.Table, contacts: pa.Table, overlaps: dict[tuple[str
     for labels, columns, _ in groups(agents):
         own = found.get(tuple(labels.values()))
         cells = _fault_cells(own) if own is not None else ["0"] * 10
-        share = float(np.mean(columns["struck_standing"].astype(float)))
+        share = float(np.mean(columns[col.STRUCK_STANDING].astype(float)))
         rows.append([_place(labels), labels["controller"], *cells, f"{share:.3f}"])
     lines = ["## Who moved into whom", "", _FAULT, *table(headings, rows)]
     if overlaps:

@@ -5,31 +5,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from socialnav_mj.report import columns as col
+from socialnav_mj.report.estimates import MEASURES
 from socialnav_mj.studies.intervals import Interval, two_way_interval
 from socialnav_mj.studies.panel import COMMON, METHODS, Panel, Term
 
-SHARES = (
-    "success",
-    "timed_out",
-    "first_hit_pedestrian",
-    "first_hit_agent",
-    "overturned",
-    "never_spawned",
-    "intrusion_share_of_steps",
-)
-"""Measures in [0, 1]; their intervals end there."""
 LEVEL_MEASURES = (
-    *SHARES,
-    "average_speed",
-    "distance_to_displacement_success",
-    f"distance_to_displacement_success{COMMON}",
-    "intimate_intrusions",
-    "intrusion_share",
-    "completion_time_success",
-    f"completion_time_success{COMMON}",
-    f"completion_steps_success{COMMON}",
-    "time_under_way",
-    "minimum_distance",
+    col.SUCCESS,
+    col.TIMED_OUT,
+    col.FIRST_HIT_PEDESTRIAN,
+    col.FIRST_HIT_AGENT,
+    col.OVERTURNED,
+    col.NEVER_SPAWNED,
+    col.INTRUSION_SHARE_OF_STEPS,
+    col.AVERAGE_SPEED,
+    col.DISTANCE_TO_DISPLACEMENT_SUCCESS,
+    f"{col.DISTANCE_TO_DISPLACEMENT_SUCCESS}{COMMON}",
+    col.INTIMATE_INTRUSIONS,
+    col.INTRUSION_SHARE,
+    col.COMPLETION_TIME_SUCCESS,
+    f"{col.COMPLETION_TIME_SUCCESS}{COMMON}",
+    f"{col.COMPLETION_STEPS_SUCCESS}{COMMON}",
+    col.TIME_UNDER_WAY,
+    col.MINIMUM_DISTANCE,
 )
 """What is tabulated; see `estimates.MEASURES`, and `panel.COMMON` for the ending."""
 
@@ -85,7 +83,7 @@ def _level(panel: Panel, scenario: str, method: str, measure: str, training: int
     trained = panel.is_trained(method)
     trainings = panel.trainings if training is None else (training,)
     interval = two_way_interval(panel.contrast([term], trainings=trainings), trained=trained)
-    if measure in SHARES:
+    if MEASURES[measure.removesuffix(COMMON)].limits == (0.0, 1.0):  # a share's interval ends there
         ends = ("low", "high", "low_given", "high_given")
         clipped = {name: float(np.clip(getattr(interval, name), 0.0, 1.0)) for name in ends}
         interval = Interval(**{**vars(interval), **clipped})

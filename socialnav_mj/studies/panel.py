@@ -8,6 +8,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from socialnav_mj.geometry import Array
+from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, WEIGHTS, Columns, draw_means
 from socialnav_mj.report.paired import HUMAN
 
@@ -17,7 +18,7 @@ METHODS = (POTENTIAL_FIELD, REPLAY_IRL, MIXED, HUMAN)
 
 COMMON = "_common"
 """Ending of measures that are taken over the agents that all controllers brought home."""
-SUCCESS = MEASURES["success"]
+SUCCESS = MEASURES[col.SUCCESS]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,26 +165,26 @@ def make_panel(
     Raises:
         ValueError: If two controllers are the same method and training, or the table has more than one recording.
     """
-    recordings = set(zip(agents["dataset"].to_pylist(), agents["variant"].to_pylist(), strict=True))
+    recordings = set(zip(agents[col.DATASET].to_pylist(), agents[col.VARIANT].to_pylist(), strict=True))
     if len(recordings) > 1:
         raise ValueError(f"agents of {len(recordings)} recordings ({sorted(recordings)}); allowed: of one")
     entry_of = _by_role(roster)
-    shares = dict(zip(agents["scenario"].to_pylist(), agents["share"].to_pylist(), strict=True))
+    shares = dict(zip(agents[col.SCENARIO].to_pylist(), agents[col.SHARE].to_pylist(), strict=True))
     scenarios = tuple(sorted(shares, key=lambda name: (shares[name], name)))
     columns = {name: agents[name].to_numpy() for name in agents.column_names}
     draws, kept, common, cells = {}, {}, {}, {}
     for scenario in scenarios:
-        here = columns["scenario"] == scenario
-        key = np.unique(np.stack([columns["draw"][here], columns["person"][here]], axis=1), axis=0)
+        here = columns[col.SCENARIO] == scenario
+        key = np.unique(np.stack([columns[col.DRAW][here], columns[col.PERSON][here]], axis=1), axis=0)
         draws[scenario] = key[:, 0]
         kept[scenario] = np.ones(len(key), dtype=bool) if keep is None else keep(key[:, 1])
         common[scenario] = np.ones(len(key), dtype=bool)
         for (method, training), entry in entry_of.items():
-            chosen = np.flatnonzero(here & (columns["controller"] == entry.controller))
+            chosen = np.flatnonzero(here & (columns[col.CONTROLLER] == entry.controller))
             if not chosen.size:
                 continue
             own = {name: values[chosen] for name, values in columns.items()}
-            place = {agent: row for row, agent in enumerate(zip(own["draw"], own["person"], strict=True))}
+            place = {agent: row for row, agent in enumerate(zip(own[col.DRAW], own[col.PERSON], strict=True))}
             rows = np.array([place.get((draw, person), -1) for draw, person in key], dtype=np.int64)
             cells[method, scenario, training] = _Cell(own, rows)
             if method != HUMAN:

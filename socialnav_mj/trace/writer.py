@@ -32,7 +32,7 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode, EpisodeError, IntArray, Outcome, Partner
 from socialnav_mj.files import written_whole
 from socialnav_mj.metrics.collisions import collisions
-from socialnav_mj.metrics.navigation import success
+from socialnav_mj.metrics.outcomes import success
 from socialnav_mj.metrics.proximity import INTIMATE_DISTANCE, nearest_pedestrian_distance
 from socialnav_mj.slots import share_slots
 from socialnav_mj.trace import layout as look

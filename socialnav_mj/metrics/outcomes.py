@@ -1,0 +1,148 @@
+"""How did it end: arrival, success, time-out; the paper's metric 1."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.episode import Episode, Outcome
+from socialnav_mj.metrics.collisions import collisions
+from socialnav_mj.metrics.metric import Better, Kind, Mean, Metric, Need
+from socialnav_mj.metrics.missing import NEVER
+
+BoolArray = NDArray[np.bool_]
+
+
+def arrived(episode: Episode) -> BoolArray:
+    """Whether each agent came within the goal radius before its deadline, collisions or not.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,); False for agents that never spawned.
+    """
+    return episode.agent_outcome == Outcome.ARRIVED
+
+
+def success(episode: Episode) -> BoolArray:
+    """Successful completion (paper metric 1): arrived, and touched nobody on the way.
+
+    One touch of a pedestrian or of another agent voids it, whoever was at fault, whatever `on_collision` says. The
+    mean over all agents, those that never spawned included, is the paper's "fraction of runs".
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return arrived(episode) & (collisions(episode) == 0)
+
+
+def timed_out(episode: Episode) -> BoolArray:
+    """Whether each agent's deadline passed before it arrived.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return episode.agent_outcome == Outcome.TIMED_OUT
+
+
+def never_spawned(episode: Episode) -> BoolArray:
+    """Whether each agent's place was never free.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return episode.agent_outcome == Outcome.NEVER_SPAWNED
+
+
+def overturned(episode: Episode) -> BoolArray:
+    """Whether each agent ended on its side or back.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return episode.agent_outcome == Outcome.OVERTURNED
+
+
+def completion_censored(episode: Episode) -> BoolArray:
+    """Whether an agent spawned and its run ended otherwise than by arrival.
+
+    Args:
+        episode: The record.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return ~arrived(episode) & ~never_spawned(episode)
+
+
+METRICS = (
+    Metric(
+        name="success",
+        function=success,
+        kind=Kind.FLAG,
+        better=Better.MORE,
+        missing=NEVER,
+        needs=(Need.CONTACTS,),
+        formula="arrived, and no collision with anybody",
+        source="paper 1; CrowdNav and SocNavBench alike; Francis 2023 and HuNavSim count arrival alone",
+    ),
+    Metric(
+        name="arrived",
+        function=arrived,
+        kind=Kind.FLAG,
+        better=Better.MORE,
+        missing=NEVER,
+        means=(),
+        formula="|x - g| <= 0.5 m before the deadline",
+        source="SEAN asks 1.2 m by default, CrowdNav the robot's radius",
+    ),
+    Metric(
+        name="timed_out",
+        function=timed_out,
+        kind=Kind.FLAG,
+        better=Better.LESS,
+        missing=NEVER,
+        means=(Mean(narrow="timed\nout"),),
+        formula="deadline (15 s + 2 s/m |g - s| after the spawn) passed",
+        source="Francis 2023, TO",
+    ),
+    Metric(
+        name="overturned",
+        function=overturned,
+        kind=Kind.FLAG,
+        better=Better.LESS,
+        missing=NEVER,
+        formula="ended on its side or back: tilted by more than 90 degrees",
+        source="ours; it fails, and its body is taken out",
+    ),
+    Metric(
+        name="never_spawned",
+        function=never_spawned,
+        kind=Kind.FLAG,
+        better=Better.NEITHER,
+        missing=NEVER,
+        formula="its place was never free",
+        source="ours",
+    ),
+    Metric(
+        name="completion_censored",
+        function=completion_censored,
+        kind=Kind.FLAG,
+        better=Better.LESS,
+        missing=NEVER,
+        means=(),
+        formula="spawned, and ended otherwise than by arrival",
+        source="ours",
+    ),
+)
