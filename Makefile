@@ -20,7 +20,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow fuzz lint format clean python-version
+.PHONY: help demo test slow fuzz lint format docs clean python-version
 
 help:
 	@echo "make demo     run the four scenarios on the embedded recording; results in $(OUT)"
@@ -29,6 +29,7 @@ help:
 	@echo "make fuzz     feed damaged files to every reader for SECONDS=$(SECONDS) on all cores"
 	@echo "make lint     format check, lint, types"
 	@echo "make format   format and mend what can be mended"
+	@echo "make docs     bring the tables of docs/ up to date"
 	@echo "make clean    remove the environment and the caches, not the results"
 	@echo "Choose a Python with PYTHON=python3.12; it has to be 3.11 or 3.12."
 
@@ -54,6 +55,9 @@ lint: $(ALL)
 format: $(ALL)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+docs: $(PLAIN)
+	$(BIN)/python -c 'from socialnav_mj.report.definitions import write_definitions; write_definitions("docs/metrics.md")'
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from socialnav_mj.report.markdown import bounds, interval, number
+from socialnav_mj.report.markdown import bounds, interval, marked_row, number, row
 
 NAN = math.nan
 
@@ -27,3 +27,8 @@ NAN = math.nan
 )
 def test_numbers_and_intervals_are_written_as_far_as_there_are_any(written: str, expected: str) -> None:
     assert written == expected
+
+
+def test_cells_of_the_code_stay_markdown_and_those_from_files_become_text() -> None:
+    assert marked_row(["`a`", "|x| < 1"]) == "| `a` | \\|x\\| < 1 |"
+    assert row(["`a`", "|x| < 1"]) == "| \\`a\\` | \\|x\\| &lt; 1 |"

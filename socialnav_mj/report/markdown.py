@@ -50,6 +50,18 @@ def row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(plain(cell) for cell in cells) + " |"
 
 
+def marked_row(cells: Sequence[str]) -> str:
+    """One row of a table whose cells are Markdown already, as what the code says of itself; never text from a file.
+
+    Args:
+        cells: Of one line each; only what would end a cell is escaped.
+
+    Returns:
+        One line, without its line break.
+    """
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
 def head(headings: Sequence[str]) -> list[str]:
     """First two lines of a table: its headings, and the rule that Markdown wants under them.
 
