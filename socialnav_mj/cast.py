@@ -63,12 +63,12 @@ class Cast:
 
     @property
     def n_agents(self) -> int:
-        """Number of agents."""
+        """n, the length of the `agent_*` arrays."""
         return len(self.agent_index)
 
     @property
     def n_pedestrians(self) -> int:
-        """Number of replayed people."""
+        """m, the length of the `pedestrian_*` arrays."""
         return len(self.pedestrian_index)
 
 
@@ -76,11 +76,12 @@ def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
     """Split a recording's people by the scenario's draw.
 
     Args:
-        recording: The crowd.
-        scenario: Gives share, seed, time step and deadlines.
+        recording: Its people become agents or pedestrians; of those not replaced, whoever is there at no control step
+            is left out.
+        scenario: Gives share, seed, minimum displacement, control time step and deadlines.
 
     Returns:
-        The cast. People who are not there at any control step are not replayed.
+        Agents and pedestrians in the order of the recording; slots are given out so that as few as can be are needed.
 
     Raises:
         ValueError: If the draw has no agents.
@@ -148,12 +149,12 @@ class Replay:
     """
 
     def __init__(self, recording: Recording, scenario: Scenario, cast: Cast) -> None:
-        """Evaluate the tracks.
+        """Evaluate the tracks of all pedestrians from the first frame to the last pedestrian's end.
 
         Args:
-            recording: The crowd.
-            scenario: Gives the time steps.
-            cast: Says who is replayed, in which slot.
+            recording: Its tracks are evaluated here, and not asked again.
+            scenario: Gives the control and the physics time step.
+            cast: Of this recording and scenario; says who is replayed, in which slot, from when to when.
         """
         self._count = count = scenario.n_sub_steps
         slots = cast.n_pedestrian_slots
@@ -180,10 +181,10 @@ class Replay:
         """Everybody in the scene at a control step.
 
         Args:
-            step: >= 0; there is nobody after the recording's end.
+            step: Control step >= 0; there is nobody after the recording's end.
 
         Returns:
-            Views that must not be written to.
+            A row for every pedestrian slot; its arrays are views of this object's and must not be written to.
         """
         row = min(step, self._steps)
         return SlotCrowd(
@@ -200,7 +201,7 @@ class Replay:
         """Positions and velocities at the beginning of every physics step of a control step.
 
         Args:
-            step: >= 0.
+            step: Control step >= 0.
 
         Returns:
             Position [m] and velocity [m/s], both of shape (n_sub_steps, n_slots, 2).

@@ -45,7 +45,7 @@ class Robot:
     radius: float = 0.17
     """Radius of the bumper, the robot's footprint [m]."""
     wheel_radius: float = 0.06
-    """[m]."""
+    """Radius of the two driven wheels [m]."""
     track: float = 0.24
     """Distance between the wheels' contact points [m]."""
     max_speed: float = 1.0
@@ -69,7 +69,7 @@ class Scenario:
     seed: int = 0
     """Seed of the permutation of people (the draw)."""
     robot: Robot = field(default_factory=Robot)
-    """The agents' bodies."""
+    """Body of every agent."""
     pedestrian_radius: float = 0.15
     """Radius of a replayed person's body [m]."""
     turn_limit: TurnLimit = "per_step"

@@ -23,7 +23,7 @@ class AgentQueue:
         self._waiting: list[int] = []
 
     def waiting(self, step: int) -> list[int]:
-        """Agents who want to come in.
+        """Agents whose person has appeared and who have not been let in.
 
         Args:
             step: The current control step; must not go back.
@@ -37,10 +37,10 @@ class AgentQueue:
         return list(self._waiting)
 
     def let_in(self, agent: int) -> None:
-        """An agent waits no longer.
+        """Take an agent out of the queue.
 
         Args:
-            agent: One of `waiting`.
+            agent: Index into the cast; one of those that `waiting` returned.
         """
         self._waiting.remove(agent)
 

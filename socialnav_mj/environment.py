@@ -22,7 +22,7 @@ class Environment(control.Environment):
         """One reward a slot.
 
         Returns:
-            Shape (n_slots,).
+            Shape (n_slots,), float64, without bounds.
         """
         return self.task.reward_spec(self.physics)
 
@@ -41,12 +41,12 @@ def make_environment(
     """A scenario on a recording as a dm_control environment.
 
     Args:
-        scenario: Its settings; those of `Scenario` by default.
+        scenario: Settings that `changes` start from; None for the defaults of `Scenario`.
         dataset: Name in the catalogue, path of a recording, or a recording.
         variant: Which annotation of the recording; None is the default one.
         data_dir: Where recordings are looked for first; None means SOCIALNAV_MJ_DATA, then the user cache.
         time_limit: The episode is cut after this time; by default it ends when the last agent's run has [s].
-        random: As in dm_control. An integer is another name for the setting `seed`.
+        random: An integer is another name for the setting `seed`. A generator is kept by the task, which draws nothing.
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
         **changes: Settings that differ: any field of `socialnav_mj.config.Scenario`, such as share=0.3, seed=4 or
             goal_radius=0.3, and any of `Robot` as robot_radius=0.2, robot_model="mine.xml".
@@ -83,13 +83,13 @@ def build_environment(
     random: int | np.random.RandomState | None = None,
     environment_kwargs: dict[str, Any] | None = None,
 ) -> Environment:
-    """A resolved scenario as a dm_control environment.
+    """A dm_control environment of a recording that is at hand and a scenario that is final.
 
     Args:
-        recording: The crowd.
-        scenario: The resolved scenario.
+        recording: Whose people are replaced and replayed; floor and cameras are centred on it.
+        scenario: Decides everything else.
         time_limit: The episode is cut after this time [s].
-        random: As in dm_control.
+        random: Kept by the task, which draws nothing from it.
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
 
     Returns:

@@ -39,7 +39,7 @@ def observe(
     pedestrian_velocity: Array,
     pedestrian_slots: NDArray[np.int64],
 ) -> dict[str, NDArray[Any]]:
-    """Observation of every agent slot.
+    """Turn the state of a scene in world coordinates into what every agent slot is shown.
 
     Args:
         active: (n,) which slots hold an agent under way.

@@ -33,10 +33,10 @@ class Sample:
 
     @classmethod
     def of(cls, physics: Physics, agent: IntArray) -> "Sample":
-        """What the physics says now.
+        """State of the robots in all slots as the simulator has it now.
 
         Args:
-            physics: The physics.
+            physics: With as many robots as there are slots.
             agent: Index of the agent in each slot, -1 for nobody, shape (n_slots,).
 
         Returns:

@@ -21,10 +21,10 @@ def agent_name(slot: int) -> str:
     """Prefix of all names of one robot.
 
     Args:
-        slot: Slot index.
+        slot: Place in the pool of robots, from 0.
 
     Returns:
-        Such as "agent_003/".
+        "agent_003/" for slot 3.
     """
     return f"{AGENT_PREFIX}{slot:03d}/"
 
@@ -33,10 +33,10 @@ def pedestrian_name(slot: int) -> str:
     """Prefix of all names of one pedestrian.
 
     Args:
-        slot: Slot index.
+        slot: Place in the pool of pedestrians, from 0.
 
     Returns:
-        Such as "pedestrian_003/".
+        "pedestrian_003/" for slot 3.
     """
     return f"{PEDESTRIAN_PREFIX}{slot:03d}/"
 
@@ -44,10 +44,10 @@ def pedestrian_name(slot: int) -> str:
 def build_model(
     scenario: Scenario, *, n_agent_slots: int, n_pedestrian_slots: int, low: Array, high: Array
 ) -> mujoco.MjModel:
-    """Compile the scene.
+    """Compile the arena with a pool of robots and a pool of mocap pedestrians, apart from one another on the floor.
 
     Args:
-        scenario: Gives radii, limits and the physics time step.
+        scenario: Gives the robot and its limits, radii, the physics time step and the re-arm time of contacts.
         n_agent_slots: Robots in the pool, >= 1.
         n_pedestrian_slots: Mocap bodies in the pool, >= 1.
         low: Least coordinates of the recorded crowd, shape (2,) [m].

@@ -34,23 +34,23 @@ class SceneIndex:
 
     @property
     def n_agents(self) -> int:
-        """Robots in the pool."""
+        """n, the robots in the pool."""
         return len(self.qpos)
 
     @property
     def n_pedestrians(self) -> int:
-        """Mocap bodies in the pool."""
+        """m, the mocap bodies in the pool."""
         return len(self.pedestrian_geom)
 
 
 def index_scene(model: mujoco.MjModel) -> SceneIndex:
-    """Look up the names of a scene.
+    """Addresses and ids of a compiled scene, looked up by the names that `scene` gives.
 
     Args:
-        model: Of `scene.build_model`.
+        model: As `scene.build_model` compiles it.
 
     Returns:
-        The index.
+        Good for this model and every copy of it.
 
     Raises:
         ValueError: If the floor is not the first geom or the pedestrians are not the mocap bodies, in this order.

@@ -31,10 +31,10 @@ class Continuous:
     size = 6 + 4 * n_sectors
 
     def __call__(self, view: View) -> Array:
-        """Features of a view.
+        """Describe what agents see by the 54 numbers of the class's table.
 
         Args:
-            view: Of n agents.
+            view: What n agents see.
 
         Returns:
             Shape (n, 54).
@@ -68,13 +68,13 @@ class Continuous:
         return result
 
     def mirror(self, features: Array) -> Array:
-        """Features of the mirrored scene.
+        """What the scene would give with left and right exchanged.
 
         Args:
             features: Shape (..., 54).
 
         Returns:
-            The same shape.
+            Shape (..., 54): sectors in the other order; the goal's sine, yaw rate and tangential speed change sign.
         """
         s = self.n_sectors
         swap = -np.arange(s) % s

@@ -28,15 +28,15 @@ then of 8 sectors in the ring from 0.8 to 1.3 m |
     n_sectors = 8
     size = 80
     rings = (0.8, 1.3)
-    """Outer radii [m]."""
+    """Outer radii of the two rings in which risk is told [m]."""
     intimate_distance = 0.5
-    """[m]"""
+    """Whoever is nearer raises one of features 66 to 73 [m]."""
 
     def __call__(self, view: View) -> Array:
-        """Features of a view.
+        """Describe what agents see by the 80 numbers of the class's table.
 
         Args:
-            view: Of n agents.
+            view: What n agents see.
 
         Returns:
             Shape (n, 80).
@@ -70,13 +70,13 @@ then of 8 sectors in the ring from 0.8 to 1.3 m |
         return result
 
     def mirror(self, features: Array) -> Array:
-        """Features of the mirrored scene.
+        """What the scene would give with left and right exchanged.
 
         Args:
             features: Shape (..., 80).
 
         Returns:
-            The same shape.
+            Shape (..., 80): sectors and bins of the yaw rate in the other order.
         """
         s = self.n_sectors
         swap = -np.arange(s) % s

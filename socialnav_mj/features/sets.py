@@ -1,4 +1,4 @@
-"""Feature sets by name."""
+"""The feature sets that a policy's card can name, and what each of them has."""
 
 from typing import Protocol
 
@@ -9,7 +9,7 @@ from socialnav_mj.geometry import Array
 
 
 class FeatureSet(Protocol):
-    """A fixed-size description of a view."""
+    """A function from what n agents see to `size` numbers each, and how these change in a mirror."""
 
     name: str
     size: int
@@ -26,13 +26,13 @@ FEATURE_SETS: dict[str, FeatureSet] = {"continuous": Continuous(), "risk": Risk(
 
 
 def feature_set(name: str) -> FeatureSet:
-    """Feature set by name.
+    """The feature set that a policy's card or a training's configuration names.
 
     Args:
         name: "continuous" or "risk".
 
     Returns:
-        The feature set.
+        The one object of that set; it holds no state.
 
     Raises:
         ValueError: If there is none of this name.

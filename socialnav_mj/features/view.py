@@ -34,11 +34,12 @@ def view_of(observation: Mapping[str, NDArray[Any]], rows: NDArray[np.int64]) ->
     """What some agents see, pedestrians and other agents together.
 
     Args:
-        observation: See `socialnav_mj.observation`.
+        observation: Of all slots, keys as in `socialnav_mj.observation`; uses goal, twist, and position, velocity and
+            mask of pedestrians and of agents.
         rows: Slots of the agents, shape (n,).
 
     Returns:
-        The view; empty columns are left out.
+        What those n agents see, of p people who are there for at least one of them: pedestrians first.
     """
     position = np.concatenate([observation["pedestrian_position"][rows], observation["agent_position"][rows]], axis=1)
     velocity = np.concatenate([observation["pedestrian_velocity"][rows], observation["agent_velocity"][rows]], axis=1)
