@@ -27,14 +27,14 @@ DATA_VARIABLE = "SOCIALNAV_MJ_DATA"
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueRow:
-    """What is known of one recording."""
+    """A table of `data/catalogue.toml`: what a recording is, where its files are and how they are read."""
 
     name: str
     title: str
     folder: str
     """Below a data directory, or below the embedded `data` folder if there is no url."""
     url: str | None
-    """Of the folder's files; None for an embedded recording."""
+    """Address below which the folder's files are downloaded; None for an embedded recording."""
     source: str
     licence: str
     frame_rate: float
@@ -42,7 +42,7 @@ class CatalogueRow:
     scale: str
     """How the files' unit becomes metres, in words."""
     axis_order: AxisOrder
-    """What the homography of the vsp takes."""
+    """Whether the homography of the vsp takes (x, y) or (y, x)."""
     variants: Mapping[Variant, Mapping[str, str]]
     """Per variant: file names with their sha256, in reading order; the first variant is the default."""
 
@@ -52,7 +52,7 @@ def catalogue() -> Mapping[str, CatalogueRow]:
     """All known recordings by name, from `data/catalogue.toml`.
 
     Returns:
-        Rows in the order of the file.
+        Name: row, in the order of the file; read once a process.
     """
     return read_catalogue(data_folder() / "catalogue.toml")
 
@@ -107,16 +107,16 @@ def _is_below(path: str) -> bool:
 
 
 def catalogue_row(name: str) -> CatalogueRow:
-    """The row of a recording.
+    """What the catalogue says of a recording.
 
     Args:
-        name: In the catalogue.
+        name: As it stands in `data/catalogue.toml`.
 
     Returns:
-        The row.
+        Source, frame rate, scale, and files with their sha256.
 
     Raises:
-        ValueError: If there is none; lists what exists.
+        ValueError: If the catalogue has no such name; lists those that it has.
     """
     if name not in catalogue():
         raise ValueError(f"unknown recording {name!r}; available: {', '.join(catalogue())}, or the path of one")
@@ -127,7 +127,7 @@ def data_directories(data_dir: str | Path | None = None) -> tuple[Path, ...]:
     """Where downloaded recordings are looked for, in this order.
 
     Args:
-        data_dir: Given on the command line, if any.
+        data_dir: Comes before all others; None if none is given.
 
     Returns:
         `data_dir`, the directory named by SOCIALNAV_MJ_DATA, and the user's cache, as far as they are set.
@@ -153,13 +153,13 @@ def load_recording(
 
     Args:
         name_or_path: For example `plaza`, `students003` or `recordings/mine.txt`.
-        variant: Which of several annotations; None takes the default (see `source_files` for paths).
-        data_dir: Looked into first.
+        variant: Which of several annotations; None takes the catalogue's first, or what the file at a path looks like.
+        data_dir: Where files of the catalogue are looked for first; None means SOCIALNAV_MJ_DATA, then the user cache.
         reading: What the file does not say, or says wrongly, and bounds on what it may hold.
-        warn: Whether to log what looks wrong (see `doubts`).
+        warn: Whether to log what looks wrong with its scale in space or time.
 
     Returns:
-        The recording.
+        Its people as tracks in metres and seconds.
 
     Raises:
         ValueError: If the name, the variant or the format is unknown, or a file is not what it should be.

@@ -38,8 +38,8 @@ def sample_times(recording: Recording, timestep: float = SAMPLE_TIMESTEP) -> Arr
     """Evenly spaced times over a recording.
 
     Args:
-        recording: The crowd.
-        timestep: > 0 [s].
+        recording: Its first appearance and its end bound the times.
+        timestep: Between two times, > 0 [s].
 
     Returns:
         (t,) from the first appearance to the end at most [s].
@@ -53,10 +53,10 @@ def pairs_of(crowd: Crowd) -> Pairs:
     """Distances between all people who are present together.
 
     Args:
-        crowd: Of t times.
+        crowd: n people at t times.
 
     Returns:
-        The pairs.
+        One row for every time and every two people who are present at it.
     """
     rows, firsts, seconds, distances = [], [], [], []
     for row, present in enumerate(crowd.present):
@@ -81,7 +81,7 @@ def companions(recording: Recording) -> NDArray[np.int64]:
     pairs it finds three quarters in zara01, nine tenths in zara02, a third in students003, whose obsmat is noisy.
 
     Args:
-        recording: The crowd.
+        recording: Sampled from its first appearance to its end.
 
     Returns:
         (n_pairs, 2) indices of people, the smaller first, in ascending order.
@@ -91,10 +91,10 @@ def companions(recording: Recording) -> NDArray[np.int64]:
 
 
 def companions_of(crowd: Crowd, pairs: Pairs) -> NDArray[np.int64]:
-    """Pairs who walk together, from samples that are at hand; see `companions`.
+    """Pairs who walk together by the rule of `companions`, from samples that are at hand.
 
     Args:
-        crowd: Evenly sampled.
+        crowd: At evenly spaced times; shares of presence are shares of its rows.
         pairs: `pairs_of(crowd)`.
 
     Returns:

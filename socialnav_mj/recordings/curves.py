@@ -51,21 +51,21 @@ class Curves:
 
         Args:
             people: Indices of people, any shape that broadcasts with `times`.
-            times: [s].
+            times: Any shape that broadcasts with `people` [s].
 
         Returns:
-            Of the broadcast shape.
+            True where the person is there, of the broadcast shape.
         """
         times = np.asarray(times, dtype=float)
         late, early = times >= self.start[people] - TIME_TOLERANCE, times <= self.end[people] + TIME_TOLERANCE
         return np.asarray(late & early)
 
     def position_and_velocity(self, people: NDArray[np.int64], times: ArrayLike) -> tuple[Array, Array]:
-        """Evaluate; outside a track the nearest end's position and velocity 0.
+        """Where people are and how they move; outside a track the nearest end's position and velocity 0.
 
         Args:
             people: Indices of people, any shape that broadcasts with `times`.
-            times: [s].
+            times: Any shape that broadcasts with `people` [s].
 
         Returns:
             Positions [m] and velocities [m/s], both of the broadcast shape with a last axis of 2.
@@ -90,11 +90,11 @@ class Curves:
 
         Args:
             people: Indices of people, any shape that broadcasts with `times`.
-            times: [s].
+            times: Any shape that broadcasts with `people` [s].
             velocity: What `position_and_velocity` returned for them, with a last axis of 2 [m/s].
 
         Returns:
-            Of the broadcast shape [rad].
+            Angle from the x axis in [-pi, pi], of the broadcast shape [rad].
         """
         people, times = np.broadcast_arrays(people, np.asarray(times, dtype=float))
         key = np.clip(times, self.start[people], self.end[people]) - self._origin + people * self._span

@@ -1,4 +1,4 @@
-"""Which people of a recording are replaced by agents (design decision 4)."""
+"""Which people of a recording are replaced by agents: a seeded permutation, of which a share is taken."""
 
 from math import floor
 
@@ -12,11 +12,11 @@ def replaceable_people(recording: Recording, *, minimum_displacement: float) -> 
     """Who can become an agent: people whose last position is far enough from their first.
 
     Args:
-        recording: The crowd.
-        minimum_displacement: >= 0 [m].
+        recording: The first and last position of each person are compared.
+        minimum_displacement: Straight distance between the two that is far enough, >= 0 [m].
 
     Returns:
-        (n_people,).
+        True for those who can be replaced, (n_people,).
     """
     displacement = recording.end - recording.start
     return np.hypot(displacement[:, 0], displacement[:, 1]) >= minimum_displacement
@@ -31,9 +31,9 @@ def replaced_people(recording: Recording, *, share: float, seed: int, minimum_di
     subset of a larger one.
 
     Args:
-        recording: The crowd.
-        share: Of all people, in (0, 1].
-        seed: Of the permutation, >= 0.
+        recording: All its people are permuted, and the share counts all of them.
+        share: Agents as a share of all people, in (0, 1].
+        seed: Seed of the permutation, >= 0; draw k has seed k.
         minimum_displacement: People whose end is nearer to their start are never replaced [m].
 
     Returns:

@@ -43,7 +43,7 @@ class Facts:
     closer_than: Mapping[float, float]
     """Distance [m]: share of people who ever come closer to somebody."""
     n_companion_pairs: int
-    """See `companions`."""
+    """Pairs who walk together, by the rule of `companions.companions`."""
     n_companion_people: int
     """People in at least one of the pairs."""
     n_displaced_less_than_1m: int
@@ -51,13 +51,13 @@ class Facts:
 
 
 def facts(recording: Recording) -> Facts:
-    """Describe a recording.
+    """Size, speeds, distances and companions of a recorded crowd.
 
     Args:
-        recording: The crowd.
+        recording: Sampled every 0.2 s from its first appearance to its end.
 
     Returns:
-        Its figures; percentiles of nothing (nobody ever meets) are NaN.
+        One number or one set of percentiles each; percentiles of nothing (nobody ever meets) are NaN.
     """
     crowd = recording.at(sample_times(recording))
     pairs = pairs_of(crowd)

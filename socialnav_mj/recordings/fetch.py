@@ -24,12 +24,12 @@ def fetch(name: str, *, data_dir: str | Path | None = None, progress: Progress |
     """Download all files of a recording; those that are there and right are kept.
 
     Args:
-        name: In the catalogue.
+        name: As it stands in the catalogue.
         data_dir: Where to; None is the user's cache, where `load_recording` looks without being told.
-        progress: Told of every chunk.
+        progress: Called after every chunk that arrives.
 
     Returns:
-        The files.
+        Paths of all files of all variants, in the order of the catalogue.
 
     Raises:
         ValueError: If the name is unknown or the recording is embedded.
@@ -47,15 +47,15 @@ def fetch_row(row: CatalogueRow, root: Path, *, progress: Progress | None = None
     """Download all files of a catalogue row.
 
     Args:
-        row: With a url.
+        row: Of a recording that has a url.
         root: Data directory; the files go into `root / row.folder`.
-        progress: Told of every chunk.
+        progress: Called after every chunk that arrives.
 
     Returns:
-        The files, in the order of the row's variants.
+        Paths of all files, in the order of the row's variants.
 
     Raises:
-        FetchError: See `fetch`.
+        FetchError: If a download fails or has another sha256 than the row; the failed file leaves nothing behind.
     """
     expected = {name: digest for files in row.variants.values() for name, digest in files.items()}
     folder = root / row.folder

@@ -38,7 +38,7 @@ def shown(text: str) -> str:
     """Text of a file as it may stand in a message: cut where it is long, without control characters.
 
     Args:
-        text: Any.
+        text: Of any length, with any characters.
 
     Returns:
         At most 60 characters of one line.
@@ -57,10 +57,10 @@ def number(text: str, path: Path, line: int, what: str) -> float:
         what: Name of the field, for the message.
 
     Returns:
-        The number.
+        Its value as a float.
 
     Raises:
-        FormatError: If it is none.
+        FormatError: If the field is no finite number.
     """
     try:
         value = float(text)
@@ -82,10 +82,10 @@ def whole_number(text: str, path: Path, line: int, what: str) -> int:
         what: Name of the field, for the message.
 
     Returns:
-        The number.
+        Its exact value.
 
     Raises:
-        FormatError: If it is none, or beyond `LARGEST`.
+        FormatError: If the field is no whole number, or beyond `LARGEST`.
     """
     value = number(text, path, line, what)
     if len(text) <= _EXACT_DIGITS and abs(value) < 10**_EXACT_DIGITS:

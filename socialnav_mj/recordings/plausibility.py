@@ -19,7 +19,7 @@ def walking_speed(recording: Recording) -> float:
     """Median speed between successive samples over the time in which people walk (0.1 m/s or faster).
 
     Args:
-        recording: The crowd.
+        recording: Its samples are taken as they are, without interpolation.
 
     Returns:
         NaN if nobody walks [m/s].
@@ -39,7 +39,7 @@ def nearest_neighbour(recording: Recording) -> float:
     """Median distance to the nearest other person, at 50 moments over the recording, straight between samples.
 
     Args:
-        recording: The crowd.
+        recording: Looked at from its first appearance to its end.
 
     Returns:
         NaN if nobody is ever together with somebody [m].
@@ -65,13 +65,13 @@ def nearest_neighbour(recording: Recording) -> float:
 
 
 def doubts(recording: Recording) -> tuple[str, ...]:
-    """What looks wrong, and what helps.
+    """What looks wrong with a recording's frame rate or unit, and which setting would mend it.
 
     Args:
-        recording: The crowd.
+        recording: Its walking speed, its nearest neighbours and the origin of its frame rate are looked at.
 
     Returns:
-        Sentences; none for a plausible recording.
+        Sentences for a warning; none for a plausible recording.
     """
     low, high = WALKING_SPEEDS
     rate = f"the frame rate of {recording.frame_rate:g} Hz ({recording.frame_rate_origin})"

@@ -14,20 +14,20 @@ from socialnav_mj.recordings.ucy import read_obsmat, read_vsp
 
 Variant = Literal["vsp", "obsmat", "text", "ndjson"]
 DEFAULT_FRAME_RATE = 25.0
-"""Of the UCY videos, and so of the frame numbers of every format that does not state its own [Hz]."""
+"""Frame rate of the UCY videos, and so of the frame numbers of every format that does not state its own [Hz]."""
 FORMATS = """one of
   text:   lines `frame id x y`, or a table with a header that names these columns (else say --columns)
   obsmat: lines of eight numbers `frame id x z y vx vz vy`
   ndjson: lines {"track": {"f": frame, "p": id, "x": x, "y": y}}
   vsp:    a file NAME.vsp, with the homography H.txt beside it"""
-"""What can be read, for messages."""
+"""All formats with what they are recognised by, as error messages list them."""
 
 
 def sha256(paths: Sequence[Path]) -> str:
     """Checksum of files, read one after the other.
 
     Args:
-        paths: The files.
+        paths: Their contents are joined in this order.
 
     Returns:
         64 hexadecimal digits.
@@ -50,10 +50,10 @@ def source_files(
     Args:
         path: File or folder.
         variant: The format, if it is to be stated rather than recognised.
-        columns: Of a table, if they are to be stated; see `Reading.columns`.
+        columns: Names of a table's columns as `Reading.columns` has them; empty to recognise them.
 
     Returns:
-        The format and its files.
+        The format, and its files in the order in which `read_recording` takes them.
 
     Raises:
         FileNotFoundError: If the path or a file it needs does not exist.
@@ -86,18 +86,18 @@ def read_recording(
     known_rate: float | None = None,
     known_axis_order: AxisOrder | None = None,
 ) -> Recording:
-    """Read a recording.
+    """Read the files of a recording by their format and give the rows their times and unit.
 
     Args:
         files: As `source_files` returns them.
-        name: Of the recording.
-        variant: The format.
-        reading: What the file does not say.
+        name: What the recording is called in tables and episodes.
+        variant: Format of the files.
+        reading: What the files do not say, or say wrongly, and bounds on what they may hold.
         known_rate: Frame rate that the catalogue states; it yields to the reading's, not to the file's [Hz].
         known_axis_order: What the catalogue says that the homography of a vsp takes; it yields to the reading's.
 
     Returns:
-        The recording.
+        Tracks of all people with two rows or more; `frame_rate_origin` says whose frame rate was taken.
 
     Raises:
         FormatError: At the first mistake in a file.

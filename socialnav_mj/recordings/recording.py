@@ -31,7 +31,7 @@ class Crowd:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One person of a recording."""
+    """One person of a recording, who can be asked for at any time; made by `Recording.person`."""
 
     recording: "Recording"
     index: int
@@ -113,7 +113,7 @@ class Recording:
 
     @property
     def n_people(self) -> int:
-        """Number of people."""
+        """Number of tracks, which is that of `ids`."""
         return len(self.ids)
 
     @property
@@ -147,13 +147,13 @@ class Recording:
         return Curves(self.times, self.positions)
 
     def person(self, index: int) -> Track:
-        """One person's track.
+        """The curve of one person.
 
         Args:
             index: Into `ids`, 0 <= index < n_people.
 
         Returns:
-            A view that can be asked at any times.
+            A view of `curves`; nothing is copied.
 
         Raises:
             IndexError: If there is no such person.

@@ -50,15 +50,15 @@ class Samples:
         ids is logged.
 
         Args:
-            name: Of the recording.
-            variant: Of the recording.
-            frame_rate: Frames per second [Hz].
-            frame_rate_origin: Where it comes from.
-            checksum: sha256 of the source.
-            reading: Unit of the positions, and the bounds on time.
+            name: What the recording is to be called.
+            variant: Format that the rows were read from.
+            frame_rate: Frames per second, which turns frames into times [Hz].
+            frame_rate_origin: Who says it, as `Recording.frame_rate_origin` has it.
+            checksum: sha256 of the source files.
+            reading: Unit of the positions, the bounds on time, and the settings that the recording keeps.
 
         Returns:
-            The recording.
+            Tracks in metres and seconds, in ascending order of ids.
 
         Raises:
             FormatError: If a person has two rows for one frame, nobody has two rows, or a time or a position is
@@ -132,17 +132,17 @@ class Samples:
 
 
 def samples_of_rows(path: Path, rows: Iterable[Row]) -> Samples:
-    """Columns of rows.
+    """Gather rows into columns.
 
     Args:
         path: The file they come from.
         rows: In the order of the file; taken one by one, so that a long file costs 40 bytes a row.
 
     Returns:
-        The samples.
+        As many samples as rows, in their order.
 
     Raises:
-        FormatError: If there are none.
+        FormatError: If there are no rows.
     """
     table = np.fromiter(rows, dtype=_ROW)
     if not len(table):

@@ -37,11 +37,11 @@ def layout_of(lines: Iterable[str], columns: Sequence[str] = ()) -> Layout | Non
     """Recognise a table by its first line with content, and the remarks before it.
 
     Args:
-        lines: Of the file; read up to the first with content.
-        columns: What the columns are, if it is not to be recognised.
+        lines: Lines of the file; read up to the first with content.
+        columns: Name of each column in the order of the file; empty to recognise them.
 
     Returns:
-        The layout; None if the lines are no table, or nothing says what its columns are.
+        Columns, delimiter and first row; None if the lines are no table, or nothing says what its columns are.
     """
     remark: list[str] = []
     for i, line in enumerate(lines, 1):
@@ -77,7 +77,7 @@ def read_text(path: Path, columns: Sequence[str] = ()) -> tuple[Samples, float |
     `#` are skipped; a remark `framerate: 16` before the first row states the frame rate (as PedPy and JuPedSim write).
 
     Args:
-        path: The file.
+        path: UTF-8 text.
         columns: Names in the order of the file; empty to recognise them.
 
     Returns:

@@ -22,7 +22,7 @@ def read_ndjson(path: Path) -> tuple[Samples, float | None]:
     recordings and are refused.
 
     Args:
-        path: The file.
+        path: UTF-8 text, one JSON object a line.
 
     Returns:
         The rows, and the frame rate that the scenes state: their `fps` counts rows, so it is multiplied by the

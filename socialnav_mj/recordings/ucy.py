@@ -72,7 +72,7 @@ def read_vsp(path: Path, homography: Path, *, axis_order: AxisOrder = "xy") -> S
         axis_order: Whether that map takes (x, y) or (y, x).
 
     Returns:
-        The control points.
+        Control points in metres, spline by spline.
 
     Raises:
         FormatError: At the first mistake in either file.
@@ -121,10 +121,10 @@ def read_obsmat(path: Path) -> Samples:
     """Read rows of eight numbers: frame, id, x, z, y, vx, vz, vy, in metres; only frame, id, x, y are used.
 
     Args:
-        path: The file.
+        path: Text file of eight numbers a line, separated by blanks.
 
     Returns:
-        The rows.
+        Frame, id and (x, y) of every line that is not empty, in the order of the file.
 
     Raises:
         FormatError: At the first mistake.

@@ -9,7 +9,7 @@ def window(recording: Recording, begin: float, end: float) -> Recording:
     """What happens between two moments; whoever is there at one of them enters or leaves there.
 
     Args:
-        recording: The whole.
+        recording: Whose tracks are cut at the two moments.
         begin: As a share of its duration, in [0, 1).
         end: As a share of its duration, in (begin, 1].
 
