@@ -173,8 +173,8 @@ def test_episode_with_the_policies_goes_through_a_file(tmp_path):
         ({"who": "people"}, "who = 'people' is not allowed; allowed: pedestrians, anyone"),
         ({"switch_distance": -1.0}, "switch_distance = -1.0 is not allowed"),
         ({"switch_distance": float("nan")}, "switch_distance = nan is not allowed"),
-        ({"near": "go_straight"}, "near = 'go_straight' is no TwistController and cannot be mixed"),
-        ({"far": dict}, "far = <class 'dict'> is no TwistController"),
+        ({"near": "go_straight"}, "near = 'go_straight' is not allowed; allowed: objects of TwistController"),
+        ({"far": dict}, "far = <class 'dict'> is not allowed"),
     ],
 )
 def test_settings_that_cannot_be_are_named(kwargs, message):

@@ -1,4 +1,4 @@
-"""Kinds of arguments that several sub-commands take."""
+"""How scenarios, names and folders are written in the help of all sub-commands that take them."""
 
 from pathlib import Path
 from typing import Annotated, Literal

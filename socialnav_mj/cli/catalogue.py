@@ -1,4 +1,4 @@
-"""Sub-commands that say what there is."""
+"""The sub-commands `list` and `data`: which tasks, controllers and recordings there are, and what is in a recording."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -17,7 +17,7 @@ class List:
     """Show the tasks, controllers and recordings that there are."""
 
     def run(self) -> None:
-        """Print three tables."""
+        """Print a table each of tasks, controllers and recordings."""
         import tasks
         from socialnav_mj.controllers import available
         from socialnav_mj.recordings.catalogue import catalogue
@@ -45,7 +45,7 @@ class DataList:
     """Where recordings are looked for first."""
 
     def run(self) -> None:
-        """Print the catalogue."""
+        """Print a table for each recording, and whether its default variant is here and has the right sha256."""
         from socialnav_mj.recordings.catalogue import catalogue, load_recording
 
         for name, row in catalogue().items():
@@ -79,7 +79,7 @@ class DataInfo:
     reading: Reading = DEFAULT_READING
 
     def run(self) -> None:
-        """Print the facts."""
+        """Print the figures, then size, frame rate and checksum in two lines."""
         from rich.markdown import Markdown
 
         from socialnav_mj.recordings import load_recording
@@ -100,7 +100,7 @@ class DataFetch:
     """Where to put it; the user cache by default."""
 
     def run(self) -> None:
-        """Download."""
+        """Download what is not there yet, and print the paths."""
         from socialnav_mj.recordings.fetch import fetch
 
         with errors.status(f"downloading {self.name}"):
@@ -120,5 +120,5 @@ class Data:
     ]
 
     def run(self) -> None:
-        """Do what was asked for."""
+        """Run list, info or fetch."""
         self.action.run()

@@ -1,4 +1,4 @@
-"""The sub-command that measures."""
+"""The sub-command `bench`: what an episode costs beside the bare physics."""
 
 import json
 import shlex
@@ -25,7 +25,7 @@ class Bench:
     scenarios: Scenarios = (1, 4)
     """Scenarios to measure."""
     controller: str = "potential_field"
-    """See `evaluate`."""
+    """Name, or package.module:Class, with settings if need be, as in `evaluate`."""
     seed: int = 0
     """Seed of the draw."""
     repetitions: int = 3
@@ -34,7 +34,7 @@ class Bench:
     """JSON file to write, with package versions and the recording's checksum."""
 
     def run(self) -> None:
-        """Measure and print."""
+        """Measure scenario by scenario, print a table, and write the JSON file if one is named."""
         from socialnav_mj.benchmark import measure
         from socialnav_mj.files import write_whole
         from socialnav_mj.provenance import PACKAGES, package_versions, recording_metadata

@@ -1,4 +1,4 @@
-"""What a recording is, in one line."""
+"""The line in which `evaluate` and `data info` say what recording they read, and how."""
 
 from typing import TYPE_CHECKING
 
@@ -7,7 +7,14 @@ if TYPE_CHECKING:
 
 
 def describe(recording: "Recording") -> str:
-    """Name, size, and the frame rate with who says it."""
+    """Say in one line what was read.
+
+    Args:
+        recording: Name, variant, number of people, duration and frame rate are told.
+
+    Returns:
+        Text without a line end; it names the option that sets a frame rate where that was assumed.
+    """
     rate = f"{recording.frame_rate:g} Hz ({recording.frame_rate_origin})"
     help_ = "; --frame-rate sets another" if recording.frame_rate_origin == "assumed" else ""
     return (

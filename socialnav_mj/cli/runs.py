@@ -1,4 +1,4 @@
-"""Sub-commands that run scenarios, and look at what was run."""
+"""The sub-commands of one run: `evaluate`, `report`, `verify` and `draws`."""
 
 import shlex
 import sys
@@ -48,10 +48,10 @@ class Evaluate:
     out: Folder = None
     """Folder of the results; runs/DATASET by default."""
     settings: Annotated[object, tyro.conf.arg(constructor=Settings)] = field(default_factory=Settings)
-    """Of every scenario that is run."""
+    """Settings of every scenario that is run."""
 
     def run(self) -> None:
-        """Evaluate, then report."""
+        """Run what is missing behind a bar, write tables, report and traces, and print the main columns."""
         from socialnav_mj.cli.terminal import show
         from socialnav_mj.controllers import with_policy_of
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of, recording_of
@@ -83,7 +83,7 @@ class Report:
     """Make the tables, the report and the traces of a run again from its episodes."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
-    """Of `evaluate`."""
+    """Folder that `evaluate` wrote."""
     dialect: tuple[str, ...] = ()
     """Other benchmarks (paper, socnavbench, hunavsim, francis2023, crowdnav): tables/dialect_NAME.csv tells the metrics
     as they define them, see docs/metrics.md."""
@@ -91,7 +91,7 @@ class Report:
     """Processes; -1 for one a core."""
 
     def run(self) -> None:
-        """Report."""
+        """Write everything that is computed from the episodes, and print the main columns."""
         from socialnav_mj.cli.terminal import show
         from socialnav_mj.report.writer import write_report
 
@@ -105,7 +105,7 @@ class Verify:
     """Run stored episodes again and compare everything that they say; exit code 1 if something differs."""
 
     path: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PATH")]
-    """Folder of `evaluate`, an episode (.npz), or a trace (.rrd)."""
+    """Folder that `evaluate` wrote, an episode (.npz), or a trace (.rrd)."""
     dataset: Name = None
     """Name or path of the recording; by default the one in the catalogue that each file names."""
     data_dir: Folder = None
@@ -116,14 +116,14 @@ class Verify:
     trust_robot: tuple[Path, ...] = ()
     """MJCF files of robots, outside of the package's assets, that the files may name."""
     max_duration: float = Reading.max_duration
-    """See `evaluate` [s]."""
+    """Longer recordings are refused [s]."""
     max_gap: float = Reading.max_gap
-    """See `evaluate` [s]."""
+    """Recordings with a longer gap between two positions of one person are refused [s]."""
     jobs: int = -1
     """Processes; -1 for one a core."""
 
     def run(self) -> None:
-        """Verify."""
+        """Print a line for each file and how many agree; exit with 1 if one does not."""
         from socialnav_mj.resimulation import Trust
         from socialnav_mj.verification import files_of, verify
 
@@ -160,14 +160,14 @@ class Draws:
     """How many draws it takes to tell two controllers apart by a given difference, from the spread in a run."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
-    """Of `evaluate`, with two draws or more."""
+    """Folder that `evaluate` wrote, with two draws or more."""
     measure: str = "success"
-    """A measure of summary.csv."""
+    """Name of a measure in summary.csv."""
     difference: float = 0.05
-    """To be resolved at 95 %, in the measure's unit."""
+    """Difference that is to be resolved at 95 %, in the measure's unit."""
 
     def run(self) -> None:
-        """Print a table."""
+        """Print a row for every scenario and pair of controllers."""
         import pyarrow.parquet
 
         from socialnav_mj.report.power import resolutions, told

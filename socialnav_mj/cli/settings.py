@@ -57,10 +57,10 @@ def changes(settings: object) -> dict[str, Any]:
     """What differs from the default.
 
     Args:
-        settings: A `Settings`.
+        settings: A `Settings`, as the command line made it.
 
     Returns:
-        As `Scenario.changed` takes it.
+        Setting: value, as keyword arguments of `Scenario.changed`.
     """
     default = vars(Settings())
     return {name: value for name, value in vars(settings).items() if value != default[name]}

@@ -1,4 +1,4 @@
-"""Sub-commands that learn, and answer a question with many runs."""
+"""The sub-commands of many runs: `train`, `ship`, `reproduce` and `leave-one-out`."""
 
 import shlex
 import sys
@@ -27,14 +27,14 @@ class Train:
     partition: Literal["fused", "importance", "segment"] = "fused"
     """Estimate of the partition function."""
     seed: int = 0
-    """Of networks, exploration, sampling and draws."""
+    """Training seed: of networks, exploration, sampling and draws."""
     scene_steps: int | None = None
     """Control steps of the training scene; the committed configuration's by default."""
     out: Folder = None
     """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
 
     def run(self) -> None:
-        """Train."""
+        """Train behind a bar, print every validation, and say where the chosen policy is."""
         try:
             from socialnav_mj.learning.config import TrainingConfig
             from socialnav_mj.learning.training import Progress as Step
@@ -77,12 +77,12 @@ class Ship:
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER")]
-    """Of `train`."""
+    """Folders that `train` wrote."""
     out: Folder = None
     """Folder of policies; the package's own by default."""
 
     def run(self) -> None:
-        """Ship."""
+        """Copy weights and cards, and print the paths."""
         from socialnav_mj.controllers.replay_irl import policies_folder
         from socialnav_mj.learning.shipping import ship
 
@@ -111,7 +111,7 @@ class Reproduce:
     draws: int = 10
     """Random choices of the replaced people."""
     seed: int = 0
-    """Seed of the first draw."""
+    """Seed of the first draw; the others count up from it."""
     variants: bool = False
     """Run the other settings and the sweep of the switch distance as well."""
     variant_draws: int | None = None
@@ -124,7 +124,7 @@ class Reproduce:
     """Folder that gets a copy of figures, tables and pages: all that holds no recording and no episode."""
 
     def run(self) -> None:
-        """Run, then draw and write."""
+        """Run what is missing behind a bar, then write figures, tables and pages, and copy them if asked to."""
         from socialnav_mj.studies.files import publish
         from socialnav_mj.studies.paper.outputs import PUBLIC, write_outputs
         from socialnav_mj.studies.paper.plan import Experiment, shipped_for
@@ -170,7 +170,7 @@ class LeaveOneOut:
     draws: int = 10
     """Random choices of the replaced people."""
     seed: int = 0
-    """Seed of the first draw."""
+    """Seed of the first draw; the others count up from it."""
     jobs: int = -1
     """Processes; -1 for one a core."""
     out: Path = Path("leave_one_out")
@@ -179,7 +179,7 @@ class LeaveOneOut:
     """Folder that gets a copy of tables and page: all that holds no recording and no episode."""
 
     def run(self) -> None:
-        """Run, then write."""
+        """Run what is missing behind a bar, then write tables and the page, and copy them if asked to."""
         from socialnav_mj.studies.files import publish
         from socialnav_mj.studies.leave_one_out import study as leave_one_out
         from socialnav_mj.studies.study import reproduce

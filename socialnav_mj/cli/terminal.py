@@ -28,7 +28,7 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
     """One table for each scenario, for a terminal.
 
     Args:
-        estimates: Of `estimates.summarise`.
+        estimates: Of the measures of one run, as `estimates.summarise` returns them.
 
     Returns:
         Tables with a row for each controller, in the estimates' order.
@@ -54,10 +54,10 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
 
 
 def show(estimates: Sequence[Estimate]) -> None:
-    """Print them.
+    """Print `terminal_tables` to stdout.
 
     Args:
-        estimates: Of `estimates.summarise`.
+        estimates: Of the measures of one run, as `estimates.summarise` returns them.
     """
     for table in terminal_tables(estimates):
         console.print(table)

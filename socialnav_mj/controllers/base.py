@@ -27,7 +27,7 @@ class Limits:
     max_yaw_rate: float
     """Largest yaw rate to either side [rad/s]."""
     wheel_radius: float
-    """[m]."""
+    """Radius of the driven wheels [m]."""
     track: float
     """Distance between the wheels' contact points [m]."""
     control_timestep: float
@@ -39,13 +39,13 @@ class Limits:
 
     @classmethod
     def of(cls, scenario: Scenario) -> "Limits":
-        """Limits of a scenario's robots.
+        """What the robots of a scenario can do, and at which distances they touch.
 
         Args:
-            scenario: The resolved scenario.
+            scenario: Gives the robot, the pedestrians' radius, the turn limit and the control time step.
 
         Returns:
-            The limits.
+            The same for all agents of an episode.
         """
         return cls(
             max_speed=scenario.robot.max_speed,
@@ -113,7 +113,7 @@ class TwistController(ABC):
         """Take the limits of the episode to come.
 
         Args:
-            limits: Of the scenario's robots.
+            limits: What the robots of that episode can do; kept as `limits`.
             seed: For controllers that draw random numbers.
         """
         self.limits = limits
@@ -123,17 +123,17 @@ class TwistController(ABC):
         """Desired twist of every agent, unclipped.
 
         Args:
-            observation: See `socialnav_mj.observation`.
+            observation: Of all slots, with the keys and shapes of `socialnav_mj.observation`.
 
         Returns:
             (forward speed [m/s], yaw rate [rad/s]), shape (n_agents, 2); finite for finite observations.
         """
 
     def act(self, observation: Observation) -> Array:
-        """Wheel speeds for every agent.
+        """Wheel speeds that drive the desired twists as far as the limits allow.
 
         Args:
-            observation: See `socialnav_mj.observation`.
+            observation: Of all slots, with the keys and shapes of `socialnav_mj.observation`.
 
         Returns:
             (left, right), shape (n_agents, 2), within the limits [rad/s].

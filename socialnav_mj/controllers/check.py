@@ -16,7 +16,7 @@ def check_controller(controller: Controller, *, seed: int = 0) -> None:
 
     Args:
         controller: As it would be evaluated; it is reset.
-        seed: Of the scenes and of the controller.
+        seed: Seed of the made-up scenes, and the one that `reset` is given.
 
     Raises:
         ValueError: If something is wrong; says what, in which scene, and what is expected.

@@ -19,7 +19,7 @@ class GoStraight(TwistController):
         """Full speed scaled by the cosine of the goal's bearing, and the turn that removes it in one control step.
 
         Args:
-            observation: See `socialnav_mj.observation`; uses goal.
+            observation: Keys as in `socialnav_mj.observation`; uses goal.
 
         Returns:
             Shape (n_agents, 2) [m/s], [rad/s].

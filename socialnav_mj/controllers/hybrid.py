@@ -1,4 +1,4 @@
-"""The mixed policy (paper section III-C): one controller near people, another elsewhere."""
+"""`hybrid`, the paper's mixed policy (section III-C): one controller near people, another elsewhere."""
 
 from dataclasses import dataclass, field
 from typing import Literal, get_args
@@ -18,7 +18,7 @@ def nearest_distance(observation: Observation, *, who: Who) -> Array:
     """Distance from each agent to whoever is nearest.
 
     Args:
-        observation: See `socialnav_mj.observation`.
+        observation: Keys as in `socialnav_mj.observation`; uses positions and masks.
         who: Replayed pedestrians, or other agents as well.
 
     Returns:
@@ -43,11 +43,11 @@ class Hybrid(TwistController):
     """
 
     near: TwistController = field(default_factory=ReplayIRL, metadata={IS_CONTROLLER: True})
-    """Acts near people."""
+    """What acts while somebody is within the switch distance."""
     far: TwistController = field(default_factory=PotentialField, metadata={IS_CONTROLLER: True})
-    """Acts elsewhere."""
+    """What acts while nobody is."""
     switch_distance: float = 2.0
-    """[m]"""
+    """Acts `near` below, `far` at or above this distance between centres, >= 0 [m]."""
     who: Who = "pedestrians"
     """Whose distance counts: replayed pedestrians, or "anyone"."""
     name: str = "hybrid"
@@ -60,7 +60,9 @@ class Hybrid(TwistController):
             raise ValueError(f"switch_distance = {self.switch_distance!r} is not allowed; allowed: numbers >= 0")
         for name in ("near", "far"):
             if not isinstance(getattr(self, name), TwistController):
-                raise ValueError(f"{name} = {getattr(self, name)!r} is no TwistController and cannot be mixed")
+                raise ValueError(
+                    f"{name} = {getattr(self, name)!r} is not allowed; allowed: objects of TwistController"
+                )
 
     @property
     def policies(self) -> tuple[str, ...]:
@@ -73,11 +75,11 @@ class Hybrid(TwistController):
         return self._acting.copy()
 
     def reset(self, limits: Limits, *, seed: int = 0) -> None:
-        """Take the limits of the episode to come.
+        """Reset both controllers for the episode to come.
 
         Args:
-            limits: Of the scenario's robots.
-            seed: For controllers that draw random numbers.
+            limits: What the robots of that episode can do.
+            seed: Given to both.
         """
         super().reset(limits, seed=seed)
         for controller in (self.near, self.far):
@@ -88,7 +90,7 @@ class Hybrid(TwistController):
         """Twist of whichever controller is in charge of each agent.
 
         Args:
-            observation: See `socialnav_mj.observation`.
+            observation: Keys as in `socialnav_mj.observation`; both controllers see all of it.
 
         Returns:
             Shape (n_agents, 2) [m/s], [rad/s].

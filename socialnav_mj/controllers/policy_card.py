@@ -33,10 +33,10 @@ _REQUIRED: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 
 def read_card(path: Path) -> dict[str, Any]:
-    """Read a policy's card.
+    """Read and check what a policy's card says of its weights and its training.
 
     Args:
-        path: Of the card.
+        path: JSON file beside the weights.
 
     Returns:
         sha256 (of the weights' file), config (of the training), and what else the training wrote.

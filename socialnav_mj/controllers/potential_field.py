@@ -28,12 +28,12 @@ def attractive_force(
     Args:
         goal: From the agent to its goal, shape (n_agents, 2) [m].
         velocity: The agent's own, in the same frame, shape (n_agents, 2) [m/s].
-        position_gain: k_p.
-        velocity_gain: k_v.
+        position_gain: k_p >= 0, pull per metre to the goal.
+        velocity_gain: k_v >= 0, damping per m/s.
         limit: Largest size of the pull; None for the equation as printed.
 
     Returns:
-        Shape (n_agents, 2).
+        Pull minus damping in the frame of the arguments, shape (n_agents, 2).
     """
     pull = position_gain * goal
     if limit is not None:
@@ -101,13 +101,13 @@ class PotentialField(TwistController):
     """
 
     position_gain: float = 1.0
-    """k_p."""
+    """k_p >= 0: pull per metre to the goal, up to the limit."""
     velocity_gain: float = 0.5
-    """k_v."""
+    """k_v >= 0: damping per m/s."""
     repulsion_gain: float = 2.0
-    """eta."""
+    """eta >= 0: strength of the pushes."""
     influence_distance: float = 2.0
-    """rho_0 [m]."""
+    """rho_0 > 0: nobody farther away pushes [m]."""
     attraction_limit: float | None = 1.0
     """Largest size of the pull towards the goal; None for eq 3 as printed."""
     name: str = "potential_field"
@@ -123,10 +123,10 @@ class PotentialField(TwistController):
         """Total force in the agent's frame (paper eq 6).
 
         Args:
-            observation: See `socialnav_mj.observation`.
+            observation: Keys as in `socialnav_mj.observation`; uses goal, twist, positions and masks.
 
         Returns:
-            Shape (n_agents, 2).
+            Ahead and to the left, shape (n_agents, 2).
         """
         velocity = np.zeros_like(observation["goal"])
         velocity[:, 0] = observation["twist"][:, 0]
@@ -150,7 +150,7 @@ class PotentialField(TwistController):
         """Speed and yaw rate along the total force.
 
         Args:
-            observation: See `socialnav_mj.observation`.
+            observation: Keys as in `socialnav_mj.observation`; uses what `force` uses.
 
         Returns:
             Shape (n_agents, 2) [m/s], [rad/s].

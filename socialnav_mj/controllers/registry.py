@@ -35,7 +35,7 @@ def available() -> tuple[str, ...]:
 
 
 def make_controller(spec: str) -> Controller:
-    """A controller by name, with its configuration if need be.
+    """Make the controller that a name, with settings in brackets if need be, stands for.
 
     Args:
         spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class";
@@ -44,7 +44,7 @@ def make_controller(spec: str) -> Controller:
             table.
 
     Returns:
-        The controller.
+        A new controller, not yet reset.
 
     Raises:
         ValueError: If there is no such controller, or it does not take the configuration.
@@ -63,14 +63,14 @@ def make_controller(spec: str) -> Controller:
 
 
 def made(kind: Callable[..., Controller], settings: dict[str, Any]) -> Controller:
-    """A controller of a class, after those that it is made of.
+    """Make a controller; first the controllers that it is made of.
 
     Args:
-        kind: The class.
-        settings: Its arguments; controllers among them as specs.
+        kind: Class or function that makes it.
+        settings: Keyword arguments; where a field holds a controller, its spec.
 
     Returns:
-        The controller.
+        A new controller, not yet reset.
 
     Raises:
         TypeError: If the class does not take the settings.
@@ -87,10 +87,10 @@ def parse(spec: str) -> tuple[str, dict[str, Any]]:
         spec: As `make_controller` takes it.
 
     Returns:
-        Name and settings.
+        Name and settings; the settings are literals.
 
     Raises:
-        ValueError: If it cannot be read.
+        ValueError: If it is no name with literal keyword arguments.
     """
     if not isinstance(spec, str):
         raise ValueError(f"controller {spec!r} cannot be read; expected a string, as make_controller takes it")
@@ -110,16 +110,16 @@ def parse(spec: str) -> tuple[str, dict[str, Any]]:
 
 
 def factory_of(name: str) -> Callable[..., Controller]:
-    """What makes a controller.
+    """The class or function behind a controller's name; imports it if it is not built in.
 
     Args:
         name: A built-in name, an entry point, or "package.module:Class".
 
     Returns:
-        A class, or a function.
+        Called with the settings, it returns a controller.
 
     Raises:
-        ValueError: If there is none.
+        ValueError: If nothing has that name, or it cannot be imported.
     """
     if name in BUILT_IN:
         return BUILT_IN[name]
@@ -135,11 +135,11 @@ def load(name: str, path: str) -> Callable[..., Controller]:
     """Import what makes a controller; this runs its code.
 
     Args:
-        name: For the error.
+        name: What the user wrote, for the error message.
         path: "package.module:Class".
 
     Returns:
-        A class, or a function.
+        Called with the settings, it returns a controller.
 
     Raises:
         ValueError: If it cannot be imported or called.
@@ -169,13 +169,13 @@ def class_path(kind: type) -> str:
 
 
 def settings_of(kind: Callable[..., Controller]) -> list[Field[Any]]:
-    """What a controller can be told.
+    """Fields of a controller's class that can be set in a spec.
 
     Args:
-        kind: A class.
+        kind: What `factory_of` returns.
 
     Returns:
-        Fields of a dataclass that its call takes; none if it is no dataclass.
+        Those that the dataclass takes when it is called; none if it is no dataclass.
     """
     return [field for field in fields(kind) if field.init] if is_dataclass(kind) else []
 
@@ -184,9 +184,9 @@ def parts_of(kind: Callable[..., Controller]) -> tuple[str, ...]:
     """Settings that are controllers themselves, and written as specs.
 
     Args:
-        kind: A class.
+        kind: What `factory_of` returns.
 
     Returns:
-        Names.
+        Names of the fields that are marked with `IS_CONTROLLER`.
     """
     return tuple(field.name for field in settings_of(kind) if field.metadata.get(IS_CONTROLLER))

@@ -25,26 +25,26 @@ class TrainedPolicy:
     """Weights and card of a trained policy."""
 
     card: dict[str, Any]
-    """Data, seed, configuration and metrics."""
+    """What `policy_card.read_card` returns: data, seed, configuration and metrics."""
     checksum: str
     """sha256 of the weights' file."""
     features: FeatureSet
-    """What the networks see."""
+    """Makes the networks' input of what agents see."""
     actor: tuple[tuple[Array, Array], ...]
-    """(weight (out, in), bias (out,)) of each layer."""
+    """(weight (out, in), bias (out,)) of each layer of the actor, size + 2 inputs, 2 outputs."""
     reward: tuple[tuple[Array, Array], ...]
-    """The same of the reward network."""
+    """The same of the reward network, size + 2 inputs, 1 output."""
 
     @property
     def training_seed(self) -> int:
-        """Seed of the training."""
+        """Seed that the card says the training had."""
         return int(self.card["config"]["seed"])
 
     def action(self, state: Array) -> Array:
         """Deterministic action of the actor: tanh of the mean.
 
         Args:
-            state: Shape (n, size + 2).
+            state: Features and flags, see `socialnav_mj.features.states`, shape (n, size + 2).
 
         Returns:
             (speed, turn) in [-1, 1], shape (n, 2).
@@ -52,10 +52,10 @@ class TrainedPolicy:
         return tanh(_forward(self.actor, state))
 
     def reward_of(self, state: Array) -> Array:
-        """Learned reward.
+        """What the reward network gives to states: tanh of its output.
 
         Args:
-            state: Shape (n, size + 2).
+            state: Features and flags, shape (n, size + 2).
 
         Returns:
             Shape (n,), in (-1, 1).
@@ -74,10 +74,10 @@ def _forward(layers: tuple[tuple[Array, Array], ...], values: Array) -> Array:
 
 
 def policies_folder() -> Path:
-    """Where the shipped policies are.
+    """Folder of the shipped policies: weights as .safetensors, each with its card.
 
     Returns:
-        assets/policies.
+        `policies` in the assets folder.
     """
     return assets_folder() / "policies"
 
@@ -86,7 +86,7 @@ def shipped_policies() -> tuple[str, ...]:
     """Names of the policies that come with the package.
 
     Returns:
-        In alphabetical order.
+        Names of files in `policies_folder` without .safetensors, in alphabetical order.
     """
     return tuple(sorted(path.stem for path in policies_folder().glob("*.safetensors")))
 
@@ -135,7 +135,7 @@ def load_policy(name_or_path: str) -> TrainedPolicy:
         name_or_path: Name of a shipped policy, or path of a .safetensors file with its card beside it.
 
     Returns:
-        The policy.
+        Weights that fit together and the card that they have the sha256 of; read once as long as the files stay.
 
     Raises:
         PolicyError: If there is none, or its files are damaged or contradict each other.
@@ -222,10 +222,10 @@ class ReplayIRL(TwistController):
         self.checksum = self._trained.checksum
 
     def twist(self, observation: Observation) -> Array:
-        """The actor's mean action.
+        """The actor's mean action, scaled to the limits.
 
         Args:
-            observation: See `socialnav_mj.observation`.
+            observation: Keys as in `socialnav_mj.observation`; uses active and what `features.view.view_of` uses.
 
         Returns:
             Shape (n_agents, 2) [m/s], [rad/s]; 0 for inactive slots.

@@ -54,7 +54,7 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     """Configuration of a controller as it travels in every episode.
 
     Args:
-        controller: A dataclass, or anything.
+        controller: A dataclass, whose fields are its settings, or an object of any other class.
 
     Returns:
         The fields of a dataclass, and the class; for others the class alone. JSON values, as they are read back;
@@ -75,10 +75,10 @@ def controller_config(controller: Controller) -> dict[str, Any]:
 
 
 def spec_of(controller: Controller) -> str:
-    """Inverse of `make_controller`.
+    """Text from which `make_controller` makes the same controller again.
 
     Args:
-        controller: A dataclass, or anything that is made without arguments.
+        controller: A dataclass, or an object of a class that is made without arguments.
 
     Returns:
         The controller's own name if that makes the same controller, else its class with the settings
@@ -126,7 +126,7 @@ def _text(name: str, settings: dict[str, Any]) -> str:
 
 
 def controller_of(config: dict[str, Any], *, trusted: Collection[str] = ()) -> Controller:
-    """Inverse of `controller_config`, for configurations that come from a file.
+    """Make the controller again whose `controller_config` a file holds.
 
     Nothing that it names is imported or called unless it is built in, offered by an installed package, or trusted by
     whoever asks.
