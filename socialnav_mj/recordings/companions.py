@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.geometry import Array
-from socialnav_mj.recordings.recording import Crowd, Recording
+from socialnav_mj.recordings.curves import TIME_TOLERANCE
+from socialnav_mj.recordings.recording import Recording
 
 SAMPLE_TIMESTEP = 0.2
 """Time between two looks at a recording; one default control step [s]."""
@@ -21,17 +22,29 @@ COMPANION_SPEED = 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pairs:
-    """Every two people who are present at the same time, once per time; k rows in the order of time."""
+class Steps:
+    """One row a person and time at which it is there (a person-step), in the order of time, then person; k rows."""
 
     row: NDArray[np.int64]
     """(k,) index of the time."""
+    person: NDArray[np.int64]
+    """(k,) index of the person."""
+    position: Array
+    """(k, 2) [m]."""
+    velocity: Array
+    """(k, 2) [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pairs:
+    """Every two people who are present at the same time, once per time; in the order of time."""
+
     first: NDArray[np.int64]
-    """(k,) index of the person with the smaller index."""
+    """(n_pairs,) index of the person-step with the smaller index of person."""
     second: NDArray[np.int64]
-    """(k,) index of the other."""
+    """(n_pairs,) index of the other."""
     distance: Array
-    """(k,) between their centres [m]."""
+    """(n_pairs,) between their centres [m]."""
 
 
 def sample_times(recording: Recording, timestep: float = SAMPLE_TIMESTEP) -> Array:
@@ -49,26 +62,44 @@ def sample_times(recording: Recording, timestep: float = SAMPLE_TIMESTEP) -> Arr
     return np.asarray(first + timestep * np.arange(count), dtype=float)
 
 
-def pairs_of(crowd: Crowd) -> Pairs:
+def steps_of(recording: Recording, times: Array) -> Steps:
+    """Everybody at the times at which they are there; as `Recording.at`, without a cell for those who are not.
+
+    Args:
+        recording: The crowd.
+        times: Ascending [s].
+
+    Returns:
+        The person-steps.
+    """
+    first = np.searchsorted(times, recording.start_time - TIME_TOLERANCE, side="left")
+    count = np.searchsorted(times, recording.end_time + TIME_TOLERANCE, side="right") - first
+    person = np.repeat(np.arange(recording.n_people), count)
+    row = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - first, count)
+    order = np.argsort(row, kind="stable")
+    row, person = row[order], person[order]
+    position, velocity = recording.curves.position_and_velocity(person, times[row])
+    return Steps(row=row, person=person, position=position, velocity=velocity)
+
+
+def pairs_of(steps: Steps) -> Pairs:
     """Distances between all people who are present together.
 
     Args:
-        crowd: n people at t times.
+        steps: In their order.
 
     Returns:
         One row for every time and every two people who are present at it.
     """
-    rows, firsts, seconds, distances = [], [], [], []
-    for row, present in enumerate(crowd.present):
-        people = np.flatnonzero(present)
-        i, j = np.triu_indices(len(people), 1)
-        gap = crowd.position[row, people[i]] - crowd.position[row, people[j]]
-        rows.append(np.full(len(i), row))
-        firsts.append(people[i])
-        seconds.append(people[j])
-        distances.append(np.hypot(gap[:, 0], gap[:, 1]))
-    row_index, first, second = (np.concatenate(column).astype(np.int64) for column in (rows, firsts, seconds))
-    return Pairs(row=row_index, first=first, second=second, distance=np.concatenate(distances))
+    begin = np.flatnonzero(np.diff(steps.row, prepend=-1))
+    firsts, seconds = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for start, end in zip(begin, [*begin[1:], len(steps.row)], strict=True):
+        i, j = np.triu_indices(end - start, 1)
+        firsts.append(start + i)
+        seconds.append(start + j)
+    first, second = np.concatenate(firsts), np.concatenate(seconds)
+    gap = steps.position[first] - steps.position[second]
+    return Pairs(first=first, second=second, distance=np.hypot(gap[:, 0], gap[:, 1]))
 
 
 def companions(recording: Recording) -> NDArray[np.int64]:
@@ -86,25 +117,25 @@ def companions(recording: Recording) -> NDArray[np.int64]:
     Returns:
         (n_pairs, 2) indices of people, the smaller first, in ascending order.
     """
-    crowd = recording.at(sample_times(recording))
-    return companions_of(crowd, pairs_of(crowd))
+    steps = steps_of(recording, sample_times(recording))
+    return companions_of(steps, pairs_of(steps))
 
 
-def companions_of(crowd: Crowd, pairs: Pairs) -> NDArray[np.int64]:
-    """Pairs who walk together by the rule of `companions`, from samples that are at hand.
+def companions_of(steps: Steps, pairs: Pairs) -> NDArray[np.int64]:
+    """Pairs who walk together, from samples that are at hand; see `companions`.
 
     Args:
-        crowd: At evenly spaced times; shares of presence are shares of its rows.
-        pairs: `pairs_of(crowd)`.
+        steps: Evenly sampled.
+        pairs: `pairs_of(steps)`.
 
     Returns:
         (n_pairs, 2) indices of people, the smaller first, in ascending order.
     """
-    n_people = crowd.present.shape[1]
-    key, which = np.unique(pairs.first * n_people + pairs.second, return_inverse=True)
+    presence = np.bincount(steps.person)
+    n_people = len(presence)
+    key, which = np.unique(steps.person[pairs.first] * n_people + steps.person[pairs.second], return_inverse=True)
     first, second = np.divmod(key, max(n_people, 1))
-    presence = crowd.present.sum(axis=0)
-    one, other = crowd.velocity[pairs.row, pairs.first], crowd.velocity[pairs.row, pairs.second]
+    one, other = steps.velocity[pairs.first], steps.velocity[pairs.second]
     count = np.bincount(which, minlength=len(key))
 
     def mean(values: Array) -> Array:

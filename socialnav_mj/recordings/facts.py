@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from socialnav_mj.geometry import Array
-from socialnav_mj.recordings.companions import Pairs, companions_of, pairs_of, sample_times
+from socialnav_mj.recordings.companions import companions_of, pairs_of, sample_times, steps_of
 from socialnav_mj.recordings.curves import MOVING_SPEED
 from socialnav_mj.recordings.recording import Recording
 
@@ -59,13 +59,18 @@ def facts(recording: Recording) -> Facts:
     Returns:
         One number or one set of percentiles each; percentiles of nothing (nobody ever meets) are NaN.
     """
-    crowd = recording.at(sample_times(recording))
-    pairs = pairs_of(crowd)
-    present = crowd.present
-    speed = np.hypot(*crowd.velocity[present].T)
-    nearest = _nearest(pairs, present.shape)
-    closest = nearest.min(axis=0)
-    together = companions_of(crowd, pairs)
+    times = sample_times(recording)
+    steps = steps_of(recording, times)
+    pairs = pairs_of(steps)
+    present = np.bincount(steps.row, minlength=len(times))
+    speed = np.hypot(*steps.velocity.T)
+    # Distance to the nearest other person at each person-step, and at all of a person; inf if it is always alone.
+    nearest = np.full(len(steps.row), np.inf)
+    closest = np.full(recording.n_people, np.inf)
+    for one in (pairs.first, pairs.second):
+        np.minimum.at(nearest, one, pairs.distance)
+    np.minimum.at(closest, steps.person, nearest)
+    together = companions_of(steps, pairs)
     x = np.concatenate(recording.positions)
     displacement = np.hypot(*(recording.end - recording.start).T)
     width, height = np.ptp(x, axis=0)
@@ -73,13 +78,13 @@ def facts(recording: Recording) -> Facts:
         n_people=recording.n_people,
         duration=recording.duration,
         extent=(float(width), float(height)),
-        mean_present=float(present.sum(axis=1).mean()),
-        max_present=int(present.sum(axis=1).max()),
+        mean_present=float(present.mean()),
+        max_present=int(present.max()),
         speed=_percentiles(speed, SPEED_PERCENTILES),
         moving_speed=_percentiles(speed[speed >= MOVING_SPEED], SPEED_PERCENTILES),
         standing_share=float((speed < MOVING_SPEED).mean()),
         nearest_neighbour=_percentiles(nearest[np.isfinite(nearest)], NEIGHBOUR_PERCENTILES),
-        neighbour_within={d: float((nearest[present] < d).mean()) for d in NEIGHBOURHOODS},
+        neighbour_within={d: float((nearest < d).mean()) for d in NEIGHBOURHOODS},
         closer_than={d: float((closest < d).mean()) for d in CLOSE_DISTANCES},
         n_companion_pairs=len(together),
         n_companion_people=len(np.unique(together)),
@@ -128,14 +133,6 @@ def _cells(f: Facts) -> dict[str, str]:
         "companions: people": f"{f.n_companion_people}",
         "people displaced less than 1 m": f"{f.n_displaced_less_than_1m}",
     }
-
-
-def _nearest(pairs: Pairs, shape: tuple[int, ...]) -> Array:
-    """Distance to the nearest other person, (t, n), inf if absent or alone."""
-    nearest = np.full(shape, np.inf)
-    np.minimum.at(nearest, (pairs.row, pairs.first), pairs.distance)
-    np.minimum.at(nearest, (pairs.row, pairs.second), pairs.distance)
-    return nearest
 
 
 def _percentiles(values: Array, percentiles: tuple[int, ...]) -> dict[int, float]:
