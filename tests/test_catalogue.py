@@ -112,6 +112,7 @@ def test_catalogue_says_all_that_is_needed_of_each_recording() -> None:
         ),
         ('"H.txt" = "60e5', '"H.txt" = "60eX', "vsp of the recording 'plaza' is not allowed"),
         ("[plaza]", "[plaza", r"no TOML \(Expected"),
+        ("frame_rate = 25.0", "frame_rate = " + "9" * 5000, r"no TOML \(Exceeds the limit"),
         ("frame_rate = 25.0", "frame_rate = " + "[" * 10_000, r"no TOML \(maximum recursion"),
     ],
 )

@@ -71,7 +71,7 @@ def read_catalogue(path: Path) -> dict[str, CatalogueRow]:
     """
     try:
         rows = tomllib.loads("\n".join(text_lines(path)))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # an integer of 5,000 digits is a plain ValueError
         raise FormatError(path, None, f"no TOML ({shown(str(error))})", "a table a recording") from None
     return {name: _row(path, name, {"url": None, **row} if isinstance(row, dict) else {}) for name, row in rows.items()}
 
