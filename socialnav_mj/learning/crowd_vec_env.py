@@ -1,6 +1,7 @@
 """A crowd as a stable-baselines3 VecEnv: every slot of the scene is one environment."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -63,6 +64,7 @@ class CrowdVecEnv(VecEnv):
         self._random = np.random.default_rng(seed)
         self._scenes = 0
         self._actions = np.zeros((n_slots, 2))
+        self._asked = False
         size = features.size + 2
         super().__init__(
             n_slots, spaces.Box(-np.inf, np.inf, (size,), np.float32), spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -70,6 +72,7 @@ class CrowdVecEnv(VecEnv):
         self.environment = self._next_scene()
 
     def _next_scene(self) -> Environment:
+        self._drawn_from = {"random": json.dumps(self._random.bit_generator.state), "scenes": self._scenes}
         recording = self._recordings[self._scenes % len(self._recordings)]
         share = self._shares[self._scenes // len(self._recordings) % len(self._shares)]
         self._scenes += 1
@@ -93,8 +96,38 @@ class CrowdVecEnv(VecEnv):
         Returns:
             Shape (n_slots, state size).
         """
+        self._past: list[tuple[Array, bool]] = []
         self.environment.reset()
         return self._states()[0]
+
+    def state(self) -> dict[str, Any]:
+        """All that brings this moment back: what the scene was drawn from, and what was done in it.
+
+        Returns:
+            Plain values and arrays for `restore`.
+        """
+        actions = np.array([action for action, _ in self._past]).reshape(len(self._past), self.num_envs, 2)
+        return {**self._drawn_from, "actions": actions, "asked": np.array([asked for _, asked in self._past], bool)}
+
+    def restore(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
+        """Draw a scene again and do in it what was done; simulations are repeatable to the bit.
+
+        Args:
+            state: As `state` returns it, of a crowd that was made alike.
+
+        Returns:
+            What the agents see then, shape (n_slots, state size).
+        """
+        self._random.bit_generator.state = json.loads(state["random"])
+        self._scenes = int(state["scenes"])
+        self.environment = self._next_scene()
+        seen = self.reset()
+        for action, asked in zip(np.asarray(state["actions"]), np.asarray(state["asked"]), strict=True):
+            if asked:
+                self.guide_action()  # a guide may have a memory
+            self.step_async(action)
+            seen, *_ = self.step_wait()
+        return seen
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions of the next step.
@@ -102,7 +135,7 @@ class CrowdVecEnv(VecEnv):
         Args:
             actions: (speed, turn) in [-1, 1], shape (n_slots, 2); see `socialnav_mj.controllers.replay_irl`.
         """
-        self._actions = np.asarray(actions, dtype=float)
+        self._actions = np.array(actions, dtype=float)
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Step the scene.
@@ -113,6 +146,8 @@ class CrowdVecEnv(VecEnv):
         task = self.environment.task
         count = task.cast.n_agent_slots
         before = task.slot_agent
+        self._past.append((self._actions, self._asked))
+        self._asked = False
         time_step = self.environment.step(self._limits.wheel_speed(self._twist(self._actions[:count])))
         states, final = self._states()
         rewards = np.zeros(self.num_envs, dtype=np.float32)
@@ -139,6 +174,7 @@ class CrowdVecEnv(VecEnv):
         Returns:
             (speed, turn) in [-1, 1], shape (n_slots, 2); of no meaning in empty slots.
         """
+        self._asked = True
         task = self.environment.task
         wheel_speed = self._guide.act(task.get_observation(self.environment.physics))
         twist = twist_of_wheel_speed(wheel_speed, wheel_radius=self._limits.wheel_radius, track=self._limits.track)

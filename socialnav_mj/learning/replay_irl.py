@@ -5,7 +5,9 @@ its updates a reward step compares expert states with states of the same buffer,
 step.
 """
 
+import json
 import math
+from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
@@ -218,7 +220,7 @@ class ReplayIRL(SAC):
         return mirrored(self.features, states, self.random.random(count) < 0.5)
 
     def checkpoint(self) -> dict[str, Any]:
-        """What goes on after a resume; the scene and the draws of samples begin anew, the buffer is stored beside it.
+        """Everything that decides how the training goes on, between two steps of the scene.
 
         Returns:
             Tensors and plain values, readable with torch.load(weights_only=True).
@@ -238,14 +240,17 @@ class ReplayIRL(SAC):
             "n_updates": self._n_updates,
             "seconds": dict(self.seconds),
             "torch_random": torch.get_rng_state(),
+            "random": json.dumps(self.random.bit_generator.state),
+            "episodes": self._episode_num,
+            "buffer": _as_tensors(self.replay_buffer.state()),
+            "crowd": _as_tensors(self.crowd.state()),
         }
 
-    def restore(self, state: dict[str, Any], buffer: dict[str, NDArray[Any]]) -> None:
-        """Set networks, optimizers, counters, torch's random state and the buffer to a checkpoint's.
+    def restore(self, state: dict[str, Any]) -> None:
+        """Set everything to a checkpoint's: what follows is what would have followed, to the bit.
 
         Args:
             state: As `checkpoint` returns it.
-            buffer: As `SharedReplayBuffer.state` returns it.
         """
         assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
         self.policy.load_state_dict(state["policy"])
@@ -261,4 +266,17 @@ class ReplayIRL(SAC):
         self._n_updates = int(state["n_updates"])
         self.seconds = dict(state["seconds"])
         torch.set_rng_state(state["torch_random"])
-        self.replay_buffer.restore(buffer)
+        self.random.bit_generator.state = json.loads(state["random"])
+        self._episode_num = int(state["episodes"])
+        self.replay_buffer.restore(_as_arrays(state["buffer"]))
+        # With a last observation `learn` does not reset the scene.
+        self._last_obs = self._last_original_obs = self.crowd.restore(_as_arrays(state["crowd"]))
+
+
+def _as_tensors(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Arrays as what torch reads back without running code."""
+    return {k: torch.from_numpy(v) if isinstance(v, np.ndarray) else v for k, v in values.items()}
+
+
+def _as_arrays(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v.numpy() if isinstance(v, torch.Tensor) else v for k, v in values.items()}

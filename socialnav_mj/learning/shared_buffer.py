@@ -1,5 +1,7 @@
 """The replay buffer that SAC and the reward step share."""
 
+import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -181,18 +183,25 @@ class SharedReplayBuffer(ReplayBuffer):
         index = np.stack(rows, axis=1)
         return self.next_observations[index, 0], self.log_probs[index] * np.stack(known, axis=1)
 
-    def state(self) -> dict[str, NDArray[Any]]:
-        """The filled part of the buffer, for a checkpoint.
+    def state(self) -> dict[str, Any]:
+        """The filled part of the buffer and all that decides what is stored and sampled next, for a checkpoint.
 
         Returns:
-            Arrays by name, the transitions first, then a cursor of three integers; `restore` takes them.
+            Arrays by name, the transitions first, a cursor of three integers, the runs of the slots, and the random
+            state as JSON; `restore` takes them.
         """
         size = self.size()
         arrays = {name: getattr(self, name)[:size] for name in (*_ARRAYS, *_OWN_ARRAYS)}
-        return {**arrays, "cursor": np.array([self.pos, int(self.full), self._next_run])}
+        return {
+            **arrays,
+            "cursor": np.array([self.pos, int(self.full), self._next_run]),
+            "slot_run": self._slot_run.copy(),
+            "slot_row": self._slot_row.copy(),
+            "random": json.dumps(self.random.bit_generator.state),
+        }
 
-    def restore(self, state: dict[str, NDArray[Any]]) -> None:
-        """Fill from a checkpoint; the slots start new runs.
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Fill from a checkpoint.
 
         Args:
             state: As `state` returns it.
@@ -200,6 +209,5 @@ class SharedReplayBuffer(ReplayBuffer):
         for name in (*_ARRAYS, *_OWN_ARRAYS):
             getattr(self, name)[: len(state[name])] = state[name]
         self.pos, self.full, self._next_run = int(state["cursor"][0]), bool(state["cursor"][1]), int(state["cursor"][2])
-        self._slot_run = self._next_run + np.arange(len(self._slot_run))
-        self._next_run += len(self._slot_run)
-        self._slot_row[:] = -1
+        self._slot_run[:], self._slot_row[:] = state["slot_run"], state["slot_row"]
+        self.random.bit_generator.state = json.loads(state["random"])

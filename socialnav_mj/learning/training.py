@@ -31,12 +31,7 @@ from socialnav_mj.recordings.window import window
 from socialnav_mj.rollout import rollout
 
 PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
-CHECKPOINT, BUFFER, HISTORY, CONFIG = (
-    "checkpoint.pt",
-    "buffer.npz",
-    "history.json",
-    "config.json",
-)
+CHECKPOINT, HISTORY, CONFIG = "checkpoint.pt", "history.json", "config.json"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,11 +53,11 @@ def train(
     data_dir: str | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Path:
-    """Train ReplayIRL, or go on with a training that was stopped.
+    """Train ReplayIRL, or go on with a training that was stopped, from its last checkpoint and to the same end.
 
     Args:
         config: Must equal the folder's, if it holds a training.
-        folder: Gets config.json, checkpoint.pt, buffer.npz, history.json, best.safetensors, best.json and tensorboard/.
+        folder: Gets config.json, checkpoint.pt, history.json, best.safetensors, best.json and tensorboard/.
         data_dir: Where recordings are looked for first.
         progress: Called at the start, then after every scene step.
 
@@ -102,14 +97,12 @@ def train(
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
         guide=config.guide,
-        # A resumed training goes on with scenes it has not seen.
-        seed=config.seed + 1_000_003 * len(history),
+        seed=config.seed,
     )
     model = ReplayIRL(env, experts, features, config)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
     if stored is not None:
-        with np.load(folder / BUFFER, allow_pickle=False) as buffer:
-            model.restore(stored["model"], dict(buffer))
+        model.restore(stored["model"])
     if progress is not None:
         progress(Progress(scene_steps=model.scene_steps, transitions=model.replay_buffer.size(), validation=None))
     left = config.scene_steps - model.scene_steps
@@ -205,7 +198,7 @@ def _claim(folder: Path, config: TrainingConfig) -> None:
 
 
 class _Checkpoints(BaseCallback):
-    """Every so many scene steps: write a checkpoint, validate it, keep the best policy."""
+    """Every so many scene steps: validate, keep the best policy, and write a checkpoint when the updates are done."""
 
     def __init__(
         self,
@@ -220,6 +213,14 @@ class _Checkpoints(BaseCallback):
         self._history, self._report = history, progress
         self._begin = perf_counter()
         self._outcomes: list[int] = []
+        self._is_due = False
+
+    def _on_rollout_start(self) -> None:
+        """Between two steps of the scene: after the updates that followed a validation, all can be brought back."""
+        self._write_due_checkpoint()
+
+    def _on_training_end(self) -> None:
+        self._write_due_checkpoint()
 
     def _on_step(self) -> bool:
         """After every step of the scene, before its updates.
@@ -233,14 +234,14 @@ class _Checkpoints(BaseCallback):
         self._outcomes += [info["outcome"] for info in self.locals["infos"] if "outcome" in info]
         validation = None
         if scene_steps % self._config.checkpoint_every == 0 or scene_steps == self._config.scene_steps:
-            validation = self._checkpoint(model, scene_steps)
+            validation = self._validate(model, scene_steps)
         if self._report is not None:
             self._report(
                 Progress(scene_steps=scene_steps, transitions=model.replay_buffer.size(), validation=validation)
             )
         return True
 
-    def _checkpoint(self, model: ReplayIRL, scene_steps: int) -> dict[str, float]:
+    def _validate(self, model: ReplayIRL, scene_steps: int) -> dict[str, float]:
         config, folder = self._config, self._folder
         elapsed = perf_counter() - self._begin
         latest = folder / "latest.safetensors"
@@ -275,11 +276,18 @@ class _Checkpoints(BaseCallback):
         for name in ("training_arrived", "training_timed_out", "training_collided"):
             model.logger.record(f"training/{name}", entry[name])
         model.logger.dump(model.num_timesteps)
-        with written_whole(folder / BUFFER) as part:
-            np.savez(part, **model.replay_buffer.state())  # type: ignore[arg-type]
         self._history.append(entry)
-        with written_whole(folder / CHECKPOINT) as part:
-            torch.save({"model": model.checkpoint(), "history": self._history}, part)
-        write_whole(folder / HISTORY, (json.dumps(self._history, indent=1) + "\n").encode())
+        self._is_due = True
         self._begin += perf_counter() - begin
         return validation
+
+    def _write_due_checkpoint(self) -> None:
+        if not self._is_due:
+            return
+        self._is_due = False
+        begin, model = perf_counter(), self.model
+        assert isinstance(model, ReplayIRL)
+        with written_whole(self._folder / CHECKPOINT) as part:
+            torch.save({"model": model.checkpoint(), "history": self._history}, part)
+        write_whole(self._folder / HISTORY, (json.dumps(self._history, indent=1) + "\n").encode())
+        self._begin += perf_counter() - begin
