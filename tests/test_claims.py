@@ -93,7 +93,7 @@ def test_page_gives_rule_verdicts_effects_and_the_weakest_comparison_of_each_var
     row = next(line for line in page.splitlines() if line.startswith("| (a) "))
     assert row.endswith("| holds | fails |")
     weakest = next(line for line in page.splitlines() if line.startswith("| variant | fails "))
-    assert "scenario_3: mixed - potential field | -0.05" in weakest
+    assert "scenario_3: hybrid - potential field | -0.05" in weakest
     assert all(claim.sentence in page for claim in CLAIMS)
 
 

@@ -126,7 +126,7 @@ def test_methods_differ_in_brightness_and_hatch_or_marker():
 def test_sweep_runs_from_the_potential_field_to_the_learned_policy(table, tmp_path):
     paths = draw_sweep({1.0: table, 2.0: table, 5.0: table}, table, tmp_path)
     text = texts(paths[1])
-    for label in ("switch distance [m]", "PF", "IRL", "scenario 4: 90 % agents", "share of successful runs"):
+    for label in ("switch distance [m]", "PF", "IRL", "scenario 4: 90 % agents", "share of agents that succeed"):
         assert label in text
 
 

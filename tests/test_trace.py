@@ -210,7 +210,7 @@ def test_properties_identify_the_run(episode: Episode, path: Path) -> None:
     assert (run["scenario"], run["controller"], run["draw"]) == (["scenario_2"], ["straight"], [7])
     assert json.loads(run["configuration"][0]) == episode.metadata
     text = static["/run"]["TextDocument:text"][0]
-    assert "**1 of 4 robots succeeded**" in text
+    assert "**1 of 4 agents succeeded**" in text
     assert json.dumps(episode.metadata, indent=1, sort_keys=True) in text
 
 

@@ -34,16 +34,16 @@ narrow for fewer than about 10). Controllers that share draws drove the same age
 
 - **human**: the recorded people themselves, each on its own track instead of the agent that replaced it, scored by \
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
-- **success**: arrived, and touched nobody on the way, whoever was at fault; over all agents.
-- **hit first by**: share of all agents whose first touch was with a replayed pedestrian, or with another agent.
+- **success**: arrived, and had no collision on the way, whoever was at fault; over all agents.
+- **hit first by**: share of all agents whose first collision was with a pedestrian, or with another agent.
 - **timed out**: share of all agents whose deadline passed; **overturned**: of those that ended on their side or back, \
-which fails and ends the run.
+which fails and ends the trip.
 - **time of successes**: spawn to arrival, over successes alone. It flatters fragile controllers, whose successes are \
 the short trips; **time, censored** is over everybody who spawned and takes the time watched where an agent did not \
 arrive, a lower bound.
 - **path / displacement**: path traced over the straight distance from start to goal, over arrivals. The path ends \
-within the goal radius, so a straight run scores a little less than 1.
-- **intimate intrusions**: control steps with a replayed pedestrian's centre nearer than 1.2 m (the paper's number and \
+within the goal radius, so a straight trip scores a little less than 1.
+- **intimate intrusions**: control steps with a pedestrian's centre nearer than 1.2 m (the paper's number and \
 name; Hall's *personal* distance), per agent; **share** is over all steps under way. Other agents do not count.
 - **speed**: path over time under way, arrived or not.
 """
@@ -53,8 +53,8 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
     """Everything that a run says, as Markdown.
 
     Args:
-        summary: See `summary.summary_of`.
-        estimates: The same estimates.
+        summary: Command, warnings, recordings, versions and groups, as `summary.summary_of` returns them.
+        estimates: Those that the summary was made of.
         sections: Lines that stand between the tables and how to read them.
 
     Returns:

@@ -18,19 +18,19 @@ Rows = list[list[str]]
 
 _FAULT = """\
 Collisions of all draws and agents together. Who moved into whom is decided by each party's own velocity along the \
-contact normal just before the touch: at least 0.1 m/s towards the other. It is kinematics, not right of way. A \
+contact normal just before the contact: at least 0.1 m/s towards the other. It is kinematics, not right of way. A \
 collision between two agents counts once here. *Struck standing*: share of all agents that somebody walked into while \
-they stood still (slower than 0.1 m/s). *Repeated*: collisions of a pair that had touched before and parted. In the \
+they stood still (slower than 0.1 m/s). *Repeated*: collisions of a pair that had collided before. In the \
 human row the agents are the recorded people themselves.
 """
 
 _OVERLAPS = """\
-Replayed people cannot touch each other in the simulation. Share of them whose track comes as near to another replayed \
-person's as counts for a collision above."""
+Pedestrians cannot touch each other in the simulation. Share of them whose track comes as near to another \
+pedestrian's as counts for a collision above."""
 
 _SEVERITY = """\
 Collisions with people against ISO/TS 15066's limits for the lower leg, where the bumper strikes: 130 N, or 260 N for \
-at most 0.5 s. *Simulated*: peak force of the contact in MuJoCo, in which a replayed person is infinitely heavy and \
+at most 0.5 s. *Simulated*: peak force of the contact in MuJoCo, in which a pedestrian is infinitely heavy and \
 softer than flesh; *flesh*: the specification's own estimate from the closing speed for a free 8 kg robot, without \
 padding. *Clamped*: the robot touched two bodies at once; its force means nothing. See docs/metrics.md.
 """

@@ -22,8 +22,8 @@ class Look:
 LOOKS: dict[str, Look] = {
     POTENTIAL_FIELD: Look(label="potential field", colour="#DDAA33", hatch="", marker="o", line="-"),
     REPLAY_IRL: Look(label="ReplayIRL", colour="#004488", hatch="////", marker="s", line="--"),
-    MIXED: Look(label="mixed", colour="#BB5566", hatch="....", marker="D", line="-."),
-    HUMAN: Look(label="recorded humans", colour="#000000", hatch="", marker="^", line=":"),
+    MIXED: Look(label="hybrid", colour="#BB5566", hatch="....", marker="D", line="-."),
+    HUMAN: Look(label="human", colour="#000000", hatch="", marker="^", line=":"),
 }
 SHADES = ("#000000", "#004488", "#BB5566", "#DDAA33")
 """Dark to light, for whatever is no method; with MARKERS and LINES beside them."""

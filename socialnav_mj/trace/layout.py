@@ -43,11 +43,11 @@ CHOSEN_NAMES = ("yellow", "pink", "green", "violet", "white")
 KEY = """
 | colour | means |
 |---|---|
-| blue | robot, untouched so far |
-| vermilion | touched: robots for good, people for 2 s |
-| balls | touches, by closing speed; dots: earlier ones |
+| blue | robot without a collision so far |
+| vermilion | after a collision: robots for good, pedestrians for 2 s |
+| balls | collisions, by closing speed; dots: earlier ones |
 | trails | the past 3 s |
-| sand | person |
+| sand | pedestrian |
 | ring | goal of a robot on its way |
 """
 """How to read the scene."""
@@ -159,7 +159,7 @@ def layout(low: Array, high: Array, times: Array, *, max_speed: float, several_p
             rrb.Vertical(_spatial("Crowd", oblique), _spatial("From above", above), row_shares=[1.0, 1.15]),
             rrb.Vertical(
                 rrb.Tabs(*_series("speed", "Speed [m/s]", 1.25 * max_speed, axis)),
-                rrb.Tabs(*_series("nearest_human", "Nearest human [m]", 4.0, axis)),
+                rrb.Tabs(*_series("nearest_human", "Nearest pedestrian [m]", 4.0, axis)),
                 *(rrb.Tabs(*pair) for pair in zip(every, chosen, strict=True)),
             ),
             rrb.Vertical(

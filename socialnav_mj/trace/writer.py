@@ -134,12 +134,12 @@ def _summary(episode: Episode, name: str, chosen: IntArray) -> str:
     return "\n".join(
         [
             f"# {name}",
-            f"**{int(success(episode).sum())} of {episode.n_agents} robots succeeded**: arrived and touched nobody.",
+            f"**{int(success(episode).sum())} of {episode.n_agents} agents succeeded**: arrived without a collision.",
             "",
             f"- {counts[Outcome.ARRIVED]} arrived, {counts[Outcome.TIMED_OUT]} timed out, "
             f"{counts[Outcome.OVERTURNED]} overturned, {counts[Outcome.NEVER_SPAWNED]} never spawned",
-            f"- {int((collisions(episode) > 0).sum())} touched somebody: {with_people} touches with people, "
-            f"{len(touches) - with_people} between robots",
+            f"- {int((collisions(episode) > 0).sum())} collided: {with_people} collisions with pedestrians, "
+            f"{len(touches) - with_people} between agents",
             f"- recording {recording['name']} ({recording['variant']}), {episode.n_pedestrians} people replayed, "
             f"{episode.time[-1] - episode.time[0]:.0f} s",
             "",
@@ -177,7 +177,7 @@ def _limits(episode: Episode, sink: Sink) -> None:
     for entity, text, value, colour in (
         ("speed/most", "most the wheels can do", scenario.robot.max_speed, look.GREY),
         ("nearest_human/intimate", f"{INTIMATE_DISTANCE} m: intrusion", INTIMATE_DISTANCE, look.GREY),
-        ("nearest_human/touch", "touch", scenario.contact_distance, look.VERMILION),
+        ("nearest_human/touch", "contact", scenario.contact_distance, look.VERMILION),
     ):
         sink.static(f"/limits/{entity}", rr.SeriesLines(names=text, colors=colour, widths=1.0))
         sink.columns(f"/limits/{entity}", episode.time[[0, -1]], rr.Scalars.columns(scalars=[value, value]))

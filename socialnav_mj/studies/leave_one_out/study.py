@@ -92,7 +92,7 @@ class LeaveOneOut(Study):
 
         Returns:
             In the order of the recordings, and named after them; in each roster the held-out policies come last but
-            for the recorded humans.
+            for the human row.
         """
         return [self._run(recording, name) for recording, name in zip(self.recordings, self.names, strict=True)]
 

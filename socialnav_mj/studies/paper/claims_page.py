@@ -31,9 +31,9 @@ def claims_page(findings: Mapping[str, Sequence[Finding]], *, titles: Mapping[st
     """Text of claims.md: a table of verdicts, the rule, and a section for each claim with its comparisons.
 
     Args:
-        findings: Variant: one finding for each claim; the first is the default setting.
-        titles: Variant: what it changes.
-        command: That made it.
+        findings: Setting: one finding for each claim; the first setting is the default.
+        titles: Setting: what it changes.
+        command: Command line that wrote the page.
 
     Returns:
         Markdown.
@@ -70,7 +70,7 @@ def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[st
         lines.append(row(cells))
     lines += [row([label, "not run", "-", "-", "undecided", "0"]) for label in finding.missing] + [""]
     if others:
-        lines += head(["variant", "verdict", "its weakest comparison", "effect", "95 % interval", "draws"])
+        lines += head(["setting", "verdict", "its weakest comparison", "effect", "95 % interval", "draws"])
         for name, other in others.items():
             if not other.parts:
                 lines.append(row([titles[name], other.verdict, "none was run", "-", "-", "0"]))

@@ -52,7 +52,7 @@ class Drawing:
 FIGURES: tuple[Drawing, ...] = (
     Drawing(
         name="figure_1_success",
-        rows=(Row(measure="success", label="share of successful runs", top=1.0),),
+        rows=(Row(measure="success", label="share of agents that succeed", top=1.0),),
         bars=True,
     ),
     Drawing(name="figure_2_speed", rows=(Row(measure="average_speed", label="average speed [m/s]"),), bars=False),
@@ -113,7 +113,7 @@ def draw_sweep(sweep: Mapping[float, LevelTable], table: LevelTable, folder: Pat
         Paths of the files.
     """
     rows = (
-        Row(measure="success", label="share of successful runs"),
+        Row(measure="success", label="share of agents that succeed"),
         Row(measure="intrusion_share_of_steps", label="share of steps within 1.2 m"),
         Row(measure="time_under_way", label="time under way [s], censored"),
     )

@@ -30,7 +30,7 @@ _HOW_TO_READ = """\
 Means over draws (a draw is one random choice of the people who are replaced) and training seeds. Brackets, and the \
 bars of the figures: 95 % interval for other draws and other trainings, see claims.md. White dots: each training \
 alone. *Same agents*: those that every controller brought home without a collision. *Censored*: everybody who spawned; \
-who did not arrive counts with the time watched, a lower bound. *Recorded humans*: each replaced person on its own \
+who did not arrive counts with the time watched, a lower bound. *Human*: each replaced person on its own \
 track, scored by the same code; contacts by geometry. *(x n)*: n times the potential \
 field's. All numbers with their intervals: tables/levels.csv.
 """
@@ -41,9 +41,9 @@ nothing show what the crowd alone changes.
 """
 _TRAINING = """\
 What the trainings' cards say, with seeds of their own on scenes with 10, 30 and 90 % agents in each part of the \
-recording. Runs that an edge of a part cuts short are easier, so the figures do not compare with those above. The kept \
-checkpoint (ring) is the last late one whose score, validation success - {weight} x share, is within a standard error \
-of the best. Training collides at wider bodies than evaluation.
+recording. Trips that an edge of a part cuts short are easier, so the figures do not compare with those above. The \
+kept checkpoint (ring) is the last late one whose score, validation success - {weight} x share, is within a standard \
+error of the best. Training collides at wider bodies than evaluation.
 """
 _REWARD = """\
 Learned reward of an agent that drives at 0.8 m/s towards a goal 5 m ahead, with one walker (1 m/s) at each place \
@@ -64,28 +64,28 @@ def experiment_page(
 
     Args:
         table: Levels of the default setting.
-        findings: The same setting's.
+        findings: One for each claim, of the default setting.
         held_out: Period: its levels.
         sweep: Switch distance [m]: levels.
-        has_variants: Whether there is a figure of the variants.
+        has_variants: Whether there is a figure of the other settings.
         provenance: Command, experiment, recording, policies, runs.
 
     Returns:
         Markdown.
     """
     recording = provenance["recording"]
-    lines = [f"# The paper's experiment on {recording['name']} ({recording['variant']})", ""]
+    lines = [f"# The paper's study on {recording['name']} ({recording['variant']})", ""]
     lines += [f"Command: `{provenance['command']}`", "", "## Claims of the paper, default setting", ""]
     lines += head(["claim", "the paper says", "verdict"])
     lines += [row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**"]) for f in findings]
-    lines += ["", "Effects, intervals, variants and the rule: [claims.md](claims.md).", "", "## Results", ""]
+    lines += ["", "Effects, intervals, other settings and the rule: [claims.md](claims.md).", "", "## Results", ""]
     lines += [_HOW_TO_READ, *_results(table)]
     for drawing in FIGURES:
         lines += [f"![{drawing.name}](figures/{drawing.name}.png)", ""]
     if has_variants:
         drawn = provenance["experiment"]["variant_draws"] or provenance["experiment"]["draws"]
-        lines += ["## Variants of the setting", "", f"Means over {drawn} draws.", ""]
-        lines += ["![variants](figures/figure_8_variants.png)", ""]
+        lines += ["## Other settings", "", f"Means over {drawn} draws.", ""]
+        lines += ["![other settings](figures/figure_8_variants.png)", ""]
     cards = {facts["training_seed"]: facts["card"] for facts in provenance["policies"].values()}
     lines += ["## Each training", "", *_trainings(table)]
     if all("history" in card for card in cards.values()):
@@ -147,7 +147,7 @@ def _periods(held_out: Mapping[str, Sequence[Level]]) -> list[str]:
 def _swept(sweep: Mapping[float, LevelTable]) -> list[str]:
     scenarios = next(iter(sweep.values())).scenarios
     drawn = max(row.interval.n_draws for table in sweep.values() for row in table.rows)
-    lines = [f"Mixed policy over {drawn} draws: success / share of steps within 1.2 m / time under way [s].", ""]
+    lines = [f"`hybrid` over {drawn} draws: success / share of steps within 1.2 m / time under way [s].", ""]
     lines += head(["distance [m]", *(SCENARIO_TITLES.get(s, s) for s in scenarios)])
     measures = (("success", 3), ("intrusion_share_of_steps", 3), ("time_under_way", 1))
     for distance, table in sweep.items():

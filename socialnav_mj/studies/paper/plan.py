@@ -30,9 +30,9 @@ class Variant:
     task_kwargs: dict[str, Any] = field(default_factory=dict)
     """Keyword arguments of the tasks."""
     attraction_limit: float | None = 1.0
-    """Of the potential field, alone and in the mixed policy; None for eq 3 as printed."""
+    """Of the potential field, alone and in the hybrid; None for eq 3 as printed."""
     who: Who = "pedestrians"
-    """Who counts in the switch of the mixed policy."""
+    """Who counts in the switch of the hybrid."""
     runs: tuple[str, ...] = ROBOTS
     """Methods that it changes; the others are those of the default setting."""
 
@@ -57,9 +57,9 @@ class Experiment(Study):
     dataset: str
     """Name in the catalogue, or path of a recording."""
     variants: bool = False
-    """Whether to run the variants and the sweep of the switch distance as well."""
+    """Whether to run the other settings and the sweep of the switch distance as well."""
     variant_draws: int | None = None
-    """Draws of the variants and the sweep, the first ones of `draws`; None for all."""
+    """Draws of the other settings and the sweep, the first ones of `draws`; None for all."""
 
     def __post_init__(self) -> None:
         if self.variant_draws is not None and not 1 <= self.variant_draws <= self.draws:
@@ -77,7 +77,7 @@ class Experiment(Study):
 
     @property
     def settings(self) -> tuple[Variant, ...]:
-        """The default setting, and the variants if they are asked for."""
+        """The default setting, and the others if they are asked for."""
         return VARIANTS if self.variants else VARIANTS[:1]
 
     def roster(self, variant: Variant) -> tuple[Entry, ...]:
@@ -87,7 +87,7 @@ class Experiment(Study):
             variant: The setting.
 
         Returns:
-            Potential field, learned and mixed policy of each training, recorded humans.
+            Potential field, ReplayIRL and hybrid of each training, and the human row.
         """
         far = _potential_field(variant)
         return (
@@ -98,7 +98,7 @@ class Experiment(Study):
         )
 
     def sweep_roster(self, distance: float) -> tuple[Entry, ...]:
-        """The mixed policies at another switch distance.
+        """The hybrids at another switch distance.
 
         Args:
             distance: [m].
@@ -122,7 +122,7 @@ class Experiment(Study):
         """Number of draws of a run.
 
         Args:
-            name: Of a variant, or `SWEEP_RUN`.
+            name: Of a setting, or `SWEEP_RUN`.
 
         Returns:
             At least 1.

@@ -1,4 +1,4 @@
-"""Figure 9: validation success, intrusions and collided runs over each training, from the policies' cards."""
+"""Figure 9: validation success, intrusions and collided trips over each training, from the policies' cards."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from socialnav_mj.studies.looks import LINES, MARKERS, SHADES
 _PANELS = (
     ("success", "validation success"),
     ("intrusion_share", "share of steps within 1.2 m"),
-    ("training_collided", "training runs that collide"),
+    ("training_collided", "training trips that collide"),
 )
 _PARTS = (("in_sample", "in-sample"), ("validation", "validation"), ("held_out", "held out"))
 
