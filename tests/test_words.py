@@ -12,10 +12,12 @@ from socialnav_mj.studies.panel import METHODS, MIXED
 from socialnav_mj.studies.paper.claims import CLAIMS
 
 PACKAGE = Path(__file__).parent.parent / "socialnav_mj"
-SHOWN = sorted(path for room in ("report", "studies", "trace", "cli") for path in (PACKAGE / room).rglob("*.py"))
+SHOWN = sorted(
+    path for room in ("metrics", "report", "studies", "trace", "cli") for path in (PACKAGE / room).rglob("*.py")
+)
 WRONG = {
     r"\bmixed\b(?! policy)": "hybrid; 'mixed policy' where the paper is quoted",
-    r"\bfirst touch\b|\btouches\b|\btouched (nobody|somebody)\b": "collision",
+    r"\bfirst touch\b|\btouches(,| with| between)|\btouched (nobody|somebody)\b": "collision",
     r"\b(recorded|nearest) humans?\b": "human, for the row; pedestrian, for who is replayed",
     r"\bvariants? of the setting\b": "setting",
     r"\b(successful|straight|training) runs?\b": "trip",

@@ -10,20 +10,20 @@ from socialnav_mj.metrics.metric import Better, Kind, Mean, Metric, Need
 from socialnav_mj.metrics.missing import NEVER
 
 NOBODY = -1
-"""Value of `first_partner` for agents that touched nobody."""
+"""Value of `first_partner` for agents without a collision."""
 
 # Contact times count physics steps, end times control steps: the same instant may differ by rounding [s].
 _SAME_TIME = 1e-6
 
 
 def collisions(episode: Episode, partner: Partner | None = None) -> NDArray[np.int64]:
-    """Number of touches that began before or at an agent's end.
+    """Number of collisions that began before or at an agent's end.
 
-    A touch between two agents counts once for each of them. Touches of one pair are several if it parted in between.
+    A collision of two agents counts once for each of them. A pair that parted and met again has several.
 
     Args:
-        episode: The record.
-        partner: Count touches with this kind of partner alone; with both if None.
+        episode: Record whose contact log is counted, up to each agent's end.
+        partner: Count collisions with this kind of partner alone; with both if None.
 
     Returns:
         Shape (n_agents,); 0 for agents that never spawned.
@@ -35,13 +35,13 @@ def collisions(episode: Episode, partner: Partner | None = None) -> NDArray[np.i
 
 
 def first_partner(episode: Episode) -> NDArray[np.int64]:
-    """Kind of the first partner each agent touched; at the same instant the pedestrian comes first.
+    """Kind of the partner of each agent's first collision; at the same instant the pedestrian comes first.
 
     Args:
-        episode: The record.
+        episode: Record whose contact log is read in the order of time.
 
     Returns:
-        Values of `Partner`, or -1 for agents that touched nobody, shape (n_agents,).
+        Values of `Partner`, or -1 for agents without a collision, shape (n_agents,).
     """
     result = np.full(episode.n_agents, NOBODY, dtype=np.int64)
     counted = np.flatnonzero(counted_contacts(episode))
@@ -55,10 +55,10 @@ def counted_contacts(episode: Episode) -> NDArray[np.bool_]:
     """Which contacts are collisions of their agent: those that began before or at its end.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; their times and the agents' ends are compared.
 
     Returns:
-        Shape (k,).
+        True for those that count, shape (k,).
     """
     return episode.contact_time <= episode.agent_end_time[episode.contact_agent] + _SAME_TIME
 

@@ -1,4 +1,4 @@
-"""The truth about every contact: where it struck, how fast, for the how-many-eth time, and who moved into whom."""
+"""The truth about every contact: where it struck, how fast, first or repeated, and who moved into whom."""
 
 from enum import IntEnum
 
@@ -23,17 +23,17 @@ class Fault(IntEnum):
     BOTH = 2
     """Each moved towards the other."""
     NEITHER = 3
-    """Neither: a creeping or sliding touch."""
+    """Neither: they crept or slid along each other."""
 
 
 def approach_speeds(episode: Episode) -> tuple[Array, Array]:
-    """Each party's own speed towards the other along the contact normal, just before the touch.
+    """Each party's own speed towards the other along the contact normal, just before they touch.
 
     Their sum is `Episode.contact_closing_speed`. A pedestrian's velocity is the recorded one: to the solver its mocap
     body stands still.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; their normals and both velocities are used.
 
     Returns:
         The agents' and the partners', each of shape (k,); negative for who moves away [m/s].
@@ -49,10 +49,11 @@ def fault(episode: Episode) -> IntArray:
     responsible, whoever had the right of way.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts, judged by `approach_speeds`.
 
     Returns:
-        Values of `Fault`, shape (k,). Of the two rows of a touch between agents, AGENT in one is PARTNER in the other.
+        Values of `Fault`, shape (k,). Of the two rows of a contact between agents, AGENT in one is PARTNER in
+        the other.
     """
     own, others = (speed >= STANDING_SPEED for speed in approach_speeds(episode))
     return np.select([own & others, own, others], [Fault.BOTH, Fault.AGENT, Fault.PARTNER], Fault.NEITHER).astype(
@@ -64,7 +65,7 @@ def bearing(episode: Episode) -> Array:
     """Place of each contact on the robot: angle from its heading to the contact normal.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; their normals and the agents' headings are used.
 
     Returns:
         Shape (k,), in [-pi, pi): 0 ahead, pi / 2 on the left [rad].
@@ -77,11 +78,11 @@ def partner_person(episode: Episode, rows: IntArray) -> IntArray:
     """Ids of the people the partners are, or replace.
 
     Args:
-        episode: The record.
-        rows: (k,) contact rows.
+        episode: Record whose contacts name agents and pedestrians by index.
+        rows: (j,) rows of the contact log.
 
     Returns:
-        Shape (k,).
+        Ids as they stand in the recording, shape (j,).
     """
     result = np.zeros(len(rows), dtype=np.int64)
     for kind, ids in ((Partner.PEDESTRIAN, episode.pedestrian_person), (Partner.AGENT, episode.agent_person)):
@@ -94,7 +95,7 @@ def first_touch(episode: Episode) -> BoolArray:
     """Whether a contact is the first of its agent and partner, and not one after they had parted.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts in the order of time; agent and partner are compared.
 
     Returns:
         Shape (k,).
@@ -110,7 +111,7 @@ def standing(episode: Episode) -> BoolArray:
     """Whether the agent stood still (slower than `STANDING_SPEED` in any direction) just before a contact.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; the agents' velocities are used.
 
     Returns:
         Shape (k,).
@@ -124,7 +125,7 @@ def geometric_contacts(episode: Episode) -> BoolArray:
     Between two samples both bodies are taken to move straight, so that an overlap between samples is seen.
 
     Args:
-        episode: The record.
+        episode: Record whose tracks of agents and pedestrians are compared, and whose scenario gives the radii.
 
     Returns:
         Shape (n_agents, n_pedestrians): True for pairs whose centres come within the sum of their radii.
@@ -151,7 +152,7 @@ def pedestrian_overlaps(episode: Episode) -> IntArray:
     is the crowd's own density: at this distance people touch who in truth walked past each other, or arm in arm.
 
     Args:
-        episode: The record.
+        episode: Record whose tracks of pedestrians are compared, and whose scenario gives the radii.
 
     Returns:
         Shape (n_pedestrians,).

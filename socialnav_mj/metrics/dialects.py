@@ -52,7 +52,7 @@ def paper(episode: Episode) -> dict[str, Array]:
     """The paper reproduced here, section IV, metrics 1-4 and figure 2; all in time steps, centres, 1.2 m.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; scored by our metrics of the same quantities, in steps.
 
     Returns:
         Values by the paper's names, shape (n_agents,).
@@ -75,7 +75,7 @@ def socnavbench(episode: Episode) -> dict[str, Array]:
     arrival; after one the goal of the irregularity is the last position.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; outcomes, contacts, starts, goals, radii and all tracks are used.
 
     Returns:
         Values by the source's names, shape (n_agents,); time_to_collision is the smallest of the steps', inf if there
@@ -112,7 +112,7 @@ def hunavsim(episode: Episode) -> dict[str, Array]:
     moving also asks for a yaw rate under 0.01 rad/s. social_work is a sum over steps.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; outcomes, radii, yaw rates, and the tracks of agents and pedestrians are used.
 
     Returns:
         Values by the source's names, shape (n_agents,).
@@ -151,7 +151,7 @@ def francis2023(episode: Episode) -> dict[str, Array]:
     discs, we take discs. Thresholds that the table leaves open are ours.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; outcomes, contacts, starts, goals, radii and all tracks are used.
 
     Returns:
         Values by the table's names, shape (n_agents,).
@@ -190,7 +190,7 @@ def crowdnav(episode: Episode) -> dict[str, Array]:
     are a share of the agent's own steps.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; outcomes, contacts, radii, and the tracks of agents and pedestrians are used.
 
     Returns:
         Values by the source's words, shape (n_agents,); min_distance_in_danger is NaN without danger.
@@ -224,7 +224,7 @@ def compute(episode: Episode, dialect: str) -> dict[str, Array]:
     """Every metric of a dialect.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; a dialect may read everything in it.
         dialect: Key of `DIALECTS`.
 
     Returns:

@@ -22,9 +22,9 @@ def collisions_by_fault(episode: Episode, partner: Partner, who: Fault) -> Count
     Over the values of `who` they add up to `collisions(episode, partner)`.
 
     Args:
-        episode: The record.
-        partner: Kind of partner.
-        who: Whose fault.
+        episode: Record whose contact log is counted.
+        partner: Pedestrians or agents.
+        who: The party that moved into the other.
 
     Returns:
         Shape (n_agents,); 0 for agents that never spawned.
@@ -33,10 +33,10 @@ def collisions_by_fault(episode: Episode, partner: Partner, who: Fault) -> Count
 
 
 def repeated_collisions(episode: Episode) -> Counts:
-    """Number of collisions with somebody the agent had touched before and parted from.
+    """Number of collisions with somebody the agent had collided with before.
 
     Args:
-        episode: The record.
+        episode: Record whose contact log is counted, agent and partner by agent and partner.
 
     Returns:
         Shape (n_agents,); 0 for agents that never spawned.
@@ -48,7 +48,7 @@ def struck_standing(episode: Episode) -> NDArray[np.bool_]:
     """Whether an agent was ever walked into while it stood still: partner's fault, own speed under 0.1 m/s.
 
     Args:
-        episode: The record.
+        episode: Record whose contacts have the velocities of both just before.
 
     Returns:
         Shape (n_agents,); False for agents that never spawned.
@@ -60,7 +60,7 @@ def largest_closing_speed(episode: Episode) -> Array:
     """Closing speed of the fastest collision, with whomever.
 
     Args:
-        episode: The record.
+        episode: Record whose contacts have normal and velocities.
 
     Returns:
         Shape (n_agents,); NaN for agents without a collision [m/s].
@@ -69,10 +69,10 @@ def largest_closing_speed(episode: Episode) -> Array:
 
 
 def largest_peak_force(episode: Episode) -> Array:
-    """Peak normal force of the hardest collision that was not clamped; see `severity` for what it is worth.
+    """Peak normal force of the hardest collision that was not clamped; for a free robot a lower bound (see `severity`).
 
     Args:
-        episode: The record.
+        episode: Record whose contacts have peak force, time and duration.
 
     Returns:
         Shape (n_agents,); NaN for agents without such a collision and in the human row [N].
@@ -84,7 +84,7 @@ def wedged_collisions(episode: Episode) -> Counts:
     """Number of collisions in which a robot was held between bodies that did not yield; see `severity.wedged`.
 
     Args:
-        episode: The record.
+        episode: Record whose contacts have the squeeze.
 
     Returns:
         Shape (n_agents,); 0 for agents that never spawned.
@@ -98,8 +98,8 @@ def collisions_by_severity(episode: Episode, what: Severity) -> Array:
     Over the values of `what` they add up to `collisions(episode, Partner.PEDESTRIAN)`.
 
     Args:
-        episode: The record.
-        what: The class.
+        episode: Record whose contacts have peak force, time and duration.
+        what: The class that is counted; contacts that were clamped are one of their own.
 
     Returns:
         Shape (n_agents,), whole numbers; NaN for agents with a collision without physics (human row).
@@ -194,7 +194,7 @@ METRICS = (
         better=Better.LESS,
         missing=NEVER,
         needs=(Need.CONTACTS,),
-        formula="with somebody touched before",
+        formula="with somebody it collided with before",
     ),
     Metric(
         name="struck_standing",

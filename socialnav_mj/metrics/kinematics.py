@@ -18,7 +18,7 @@ def speed(episode: Episode) -> Array:
     """Speed over ground.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities at t samples.
 
     Returns:
         Shape (t, n_agents); NaN where the agent is not in the scene [m/s].
@@ -30,7 +30,7 @@ def acceleration(episode: Episode) -> Array:
     """Length of the change of velocity from each sample to the next, over the control step: turning counts too.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities at t samples, a control step apart.
 
     Returns:
         Shape (t - 1, n_agents); NaN where the agent is not at both samples [m/s^2].
@@ -42,7 +42,7 @@ def jerk(episode: Episode) -> Array:
     """Length of the second difference of velocity over the square of the control step.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities at t samples, a control step apart.
 
     Returns:
         Shape (max(t - 2, 0), n_agents); NaN where the agent is not at all three samples [m/s^3].
@@ -54,7 +54,7 @@ def maximum_speed(episode: Episode) -> Array:
     """Largest speed from the spawn's sample to the end's; a push can make it larger than the robot's limit.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities.
 
     Returns:
         Shape (n_agents,); NaN for agents that never spawned [m/s].
@@ -66,7 +66,7 @@ def maximum_tilt(episode: Episode) -> Array:
     """Largest angle between the robot's mast and the vertical at a sample, from the spawn's to the end's.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' tilts.
 
     Returns:
         Shape (n_agents,), in [0, pi]; NaN for agents that never spawned, 0 in the human row [rad].
@@ -78,7 +78,7 @@ def mean_acceleration(episode: Episode) -> Array:
     """Mean of `acceleration`; agents start from rest, people do not.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities.
 
     Returns:
         Shape (n_agents,), >= 0; NaN for agents with fewer than 2 samples [m/s^2].
@@ -90,7 +90,7 @@ def maximum_acceleration(episode: Episode) -> Array:
     """Largest `acceleration`.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities.
 
     Returns:
         Shape (n_agents,), >= 0; NaN for agents with fewer than 2 samples [m/s^2].
@@ -102,7 +102,7 @@ def mean_jerk(episode: Episode) -> Array:
     """Mean of `jerk`.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities.
 
     Returns:
         Shape (n_agents,), >= 0; NaN for agents with fewer than 3 samples [m/s^3].
@@ -114,7 +114,7 @@ def maximum_jerk(episode: Episode) -> Array:
     """Largest `jerk`.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities.
 
     Returns:
         Shape (n_agents,), >= 0; NaN for agents with fewer than 3 samples [m/s^3].
@@ -126,7 +126,7 @@ def time_not_moving(episode: Episode) -> Array:
     """Time on active steps that begin slower than `STANDING_SPEED`; every agent starts from rest, so its first counts.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' velocities and the samples at which they are under way.
 
     Returns:
         Shape (n_agents,), at most `time_under_way`; NaN for agents that never spawned [s].

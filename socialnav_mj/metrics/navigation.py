@@ -13,7 +13,7 @@ def spawn_delay(episode: Episode) -> Array:
     """Time between the person's appearance and the agent's real spawn.
 
     Args:
-        episode: The record.
+        episode: Record with the times of appearance and spawn.
 
     Returns:
         Shape (n_agents,), >= 0, whole control steps; NaN for agents that never spawned [s].
@@ -26,7 +26,7 @@ def active_steps(episode: Episode) -> Array:
     """Control steps each agent was under way: samples from its spawn up to, not including, its end.
 
     Args:
-        episode: The record.
+        episode: Record that says at which samples agents are under way.
 
     Returns:
         Shape (n_agents,); 0 for agents that never spawned.
@@ -38,7 +38,7 @@ def completion_steps(episode: Episode) -> Array:
     """Completion time in control steps, from the real spawn to the arrival (paper metric 2).
 
     Args:
-        episode: The record.
+        episode: Record with outcomes, and the samples at which agents are under way.
 
     Returns:
         Shape (n_agents,); NaN for agents that did not arrive. Those that arrived after a collision have a value.
@@ -50,7 +50,7 @@ def completion_time(episode: Episode) -> Array:
     """Completion time in seconds, from the real spawn to the arrival (paper metric 2).
 
     Args:
-        episode: The record.
+        episode: Record with outcomes, the samples at which agents are under way, and the control step.
 
     Returns:
         Shape (n_agents,); NaN for agents that did not arrive. Those that arrived after a collision have a value [s].
@@ -65,7 +65,7 @@ def time_under_way(episode: Episode) -> Array:
     therefore a lower bound, and unlike a mean over arrivals it does not get better when slow agents time out.
 
     Args:
-        episode: The record.
+        episode: Record with the samples at which agents are under way, and the control step.
 
     Returns:
         Shape (n_agents,); NaN for agents that never spawned [s].
@@ -77,7 +77,7 @@ def path_length(episode: Episode) -> Array:
     """Length of the path traced from spawn to end: the sum of the chords between samples.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' positions, from the spawn's sample to the end's.
 
     Returns:
         Shape (n_agents,); 0 for a single sample, NaN for agents that never spawned [m].
@@ -90,7 +90,7 @@ def displacement(episode: Episode) -> Array:
     """Straight distance from the start to the goal.
 
     Args:
-        episode: The record.
+        episode: Record with starts and goals; what happened in between is not used.
 
     Returns:
         Shape (n_agents,) [m].
@@ -102,11 +102,11 @@ def distance_to_displacement(episode: Episode) -> Array:
     """Path length over the distance from start to goal (paper metric 3).
 
     The path ends where the agent arrives, up to `goal_radius` r short of the goal, while the denominator d reaches the
-    goal itself, so that a straight run scores 1 - r / d and not 1. The paper's definition leaves this open; we keep
+    goal itself, so that a straight trip scores 1 - r / d and not 1. The paper's definition leaves this open; we keep
     its two quantities as they are.
 
     Args:
-        episode: The record.
+        episode: Record with outcomes, starts, goals and the agents' positions.
 
     Returns:
         Shape (n_agents,); NaN for agents that did not arrive or whose start is their goal.
@@ -120,7 +120,7 @@ def average_speed(episode: Episode) -> Array:
     """Path length over the time under way (paper figure 2), whether the agent arrived or not.
 
     Args:
-        episode: The record.
+        episode: Record with the agents' positions and the samples at which they are under way.
 
     Returns:
         Shape (n_agents,); NaN for agents without an active step [m/s].
@@ -222,8 +222,8 @@ METRICS = (
             Mean(narrow="path\nratio", narrow_digits=2),
             Mean(name="distance_to_displacement_success", heading="path / displacement of successes", successes=True),
         ),
-        formula="path_length / |g - s|; a straight run gives 1 - 0.5 m / |g - s|",
-        source="paper 3; SocNavBench's path_length_ratio has failed runs too",
+        formula="path_length / |g - s|; a straight trip gives 1 - 0.5 m / |g - s|",
+        source="paper 3; SocNavBench's path_length_ratio has failed trips too",
     ),
     Metric(
         name="average_speed",

@@ -15,7 +15,7 @@ def arrived(episode: Episode) -> BoolArray:
     """Whether each agent came within the goal radius before its deadline, collisions or not.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; their outcomes are used.
 
     Returns:
         Shape (n_agents,); False for agents that never spawned.
@@ -24,13 +24,13 @@ def arrived(episode: Episode) -> BoolArray:
 
 
 def success(episode: Episode) -> BoolArray:
-    """Successful completion (paper metric 1): arrived, and touched nobody on the way.
+    """Successful completion (paper metric 1): arrived, and had no collision on the way.
 
-    One touch of a pedestrian or of another agent voids it, whoever was at fault, whatever `on_collision` says. The
+    One collision with a pedestrian or another agent voids it, whoever was at fault, whatever `on_collision` says. The
     mean over all agents, those that never spawned included, is the paper's "fraction of runs".
 
     Args:
-        episode: The record.
+        episode: Record of n agents; their outcomes and the contact log are used.
 
     Returns:
         Shape (n_agents,).
@@ -42,7 +42,7 @@ def timed_out(episode: Episode) -> BoolArray:
     """Whether each agent's deadline passed before it arrived.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; their outcomes are used.
 
     Returns:
         Shape (n_agents,).
@@ -54,7 +54,7 @@ def never_spawned(episode: Episode) -> BoolArray:
     """Whether each agent's place was never free.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; their outcomes are used.
 
     Returns:
         Shape (n_agents,).
@@ -66,7 +66,7 @@ def overturned(episode: Episode) -> BoolArray:
     """Whether each agent ended on its side or back.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; their outcomes are used.
 
     Returns:
         Shape (n_agents,).
@@ -75,10 +75,10 @@ def overturned(episode: Episode) -> BoolArray:
 
 
 def completion_censored(episode: Episode) -> BoolArray:
-    """Whether an agent spawned and its run ended otherwise than by arrival.
+    """Whether an agent spawned and its trip ended otherwise than by arrival.
 
     Args:
-        episode: The record.
+        episode: Record of n agents; their outcomes are used.
 
     Returns:
         Shape (n_agents,).

@@ -63,10 +63,10 @@ class Pairs:
 
 @remember_last
 def pairs(episode: Episode) -> Pairs:
-    """Lay agents beside pedestrians.
+    """Offsets and relative velocities of all agents and pedestrians who are there together.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
 
     Returns:
         All pairs, without those in which somebody is absent.
@@ -93,13 +93,13 @@ def pairs(episode: Episode) -> Pairs:
 
 
 def radii(episode: Episode) -> tuple[float, float]:
-    """Radii of the bodies.
+    """Radii that an episode was simulated with.
 
     Args:
-        episode: The record.
+        episode: Record whose scenario is in its metadata.
 
     Returns:
-        The robot's and the pedestrian's [m].
+        The robot's and the pedestrians' [m].
     """
     scenario = Scenario.from_dict(episode.metadata["scenario"])
     return scenario.robot.radius, scenario.pedestrian_radius

@@ -22,10 +22,10 @@ def spl(episode: Episode) -> Array:
     """Success weighted by path length (Anderson et al. 2018, eq 1): S l / max(p, l).
 
     S is `success`, so a collision gives 0; l is the straight distance from start to goal, the shortest path in an open
-    place; p is the path length. The path ends within the goal radius, so a straight run has p < l and scores 1.
+    place; p is the path length. The path ends within the goal radius, so a straight trip has p < l and scores 1.
 
     Args:
-        episode: The record.
+        episode: Record with outcomes, contacts, starts, goals and the agents' positions.
 
     Returns:
         Shape (n_agents,), in [0, 1]; 0 for agents that never spawned.
@@ -42,7 +42,7 @@ def path_irregularity(episode: Episode) -> Array:
     the map is moved (dialect `socnavbench`); this is against the heading.
 
     Args:
-        episode: The record.
+        episode: Record with goals and the agents' positions and headings.
 
     Returns:
         Shape (n_agents,), in [0, pi]; NaN for agents without an active step off their goal [rad].
@@ -59,7 +59,7 @@ def failures_to_progress(episode: Episode) -> Array:
     start, and, counting one failure, when the time is over.
 
     Args:
-        episode: The record.
+        episode: Record with goals, the agents' positions and the control step.
 
     Returns:
         Shape (n_agents,), whole numbers; NaN for agents without an active step.

@@ -23,7 +23,7 @@ def mean_distance(episode: Episode) -> Array:
     """Distance to the nearest replayed pedestrian, averaged over active steps on which there is one.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
 
     Returns:
         Shape (n_agents,), >= `minimum_distance`; NaN for agents without such a step [m].
@@ -38,7 +38,7 @@ def zone_share(episode: Episode, zone: str) -> Array:
     The four zones' shares add up to 1; a step without any pedestrian in the scene is public.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
         zone: Key of `ZONES`.
 
     Returns:
@@ -62,7 +62,7 @@ def space_compliance(episode: Episode) -> Array:
     `francis2023`). We take the sense of the name.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
 
     Returns:
         Shape (n_agents,), in [0, 1]; NaN for agents without an active step.

@@ -19,7 +19,7 @@ def nearest_pedestrian_distance(episode: Episode) -> Array:
     """Distance from each agent to the nearest replayed pedestrian at every sample; other agents do not count.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians at t samples.
 
     Returns:
         Shape (t, n_agents), read-only; inf where no pedestrian is in the scene, NaN where the agent is not [m].
@@ -39,7 +39,7 @@ def intimate_intrusions(episode: Episode) -> Array:
     does not.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
 
     Returns:
         Shape (n_agents,); whole numbers, NaN for agents without an active step.
@@ -52,7 +52,7 @@ def intrusion_share(episode: Episode) -> Array:
     """Intimate intrusions over the active steps of the same agent.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
 
     Returns:
         Shape (n_agents,), in [0, 1]; NaN for agents without an active step.
@@ -65,7 +65,7 @@ def minimum_distance(episode: Episode) -> Array:
     """Smallest distance to a replayed pedestrian over the active steps.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians.
 
     Returns:
         Shape (n_agents,); NaN for agents without an active step with a pedestrian in the scene [m].

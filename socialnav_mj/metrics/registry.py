@@ -13,10 +13,10 @@ from socialnav_mj.metrics.metric import Metric
 
 
 def check_metrics(metrics: Sequence[Metric]) -> None:
-    """Metrics that are to stand in one table fit together.
+    """Refuse metrics that cannot stand in one table.
 
     Args:
-        metrics: Of one report.
+        metrics: All whose columns and means go into the same tables.
 
     Raises:
         ValueError: If two metrics or two means have the same name, or a weight is no metric.
@@ -48,11 +48,11 @@ METRICS = _declared()
 
 
 def per_agent(episode: Episode, metrics: Sequence[Metric] = METRICS) -> dict[str, NDArray[Any]]:
-    """Metrics of every agent.
+    """Score every agent of an episode.
 
     Args:
-        episode: To be scored.
-        metrics: Which; all of the project by default.
+        episode: Record of n agents.
+        metrics: Those to compute; all of the project by default.
 
     Returns:
         Arrays of shape (n_agents,) by the metric's name; unit, range and NaN rule are the metric's.

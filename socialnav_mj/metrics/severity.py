@@ -63,7 +63,7 @@ def flesh_force(episode: Episode) -> Array:
     damping, the robot rigid: 659 N per m/s. An upper estimate, as a padded bumper and a yielding leg lessen it.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; closing speed and kind of partner are used.
 
     Returns:
         Shape (k,), >= 0; NaN for contacts with other agents [N].
@@ -77,7 +77,7 @@ def clamped(episode: Episode) -> NDArray[np.bool_]:
     """Whether the agent touched another body during the same contact.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; agent, time and duration are used.
 
     Returns:
         Shape (k,).
@@ -96,7 +96,7 @@ def wedged(episode: Episode) -> NDArray[np.bool_]:
     people, or a row of robots between two, is squeezed without limit: by more than `WEDGE_FORCE`.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; their squeeze is used.
 
     Returns:
         Shape (k,); False in the human row.
@@ -111,7 +111,7 @@ def severity(episode: Episode, force: Array) -> IntArray:
     have come early: a strict reading, since the log keeps no force over time.
 
     Args:
-        episode: The record.
+        episode: Record with k contacts; kind of partner, time and duration are used.
         force: Peak forces to judge, `episode.contact_peak_force` or `flesh_force(episode)`, shape (k,) [N].
 
     Returns:

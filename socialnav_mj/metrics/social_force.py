@@ -65,7 +65,7 @@ def social_work(episode: Episode) -> Array:
     the log rate (dialect `hunavsim`). There are no obstacles. For the human row the agent is the recorded person.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians, and the control step.
 
     Returns:
         Shape (n_agents,), >= 0; NaN for agents without an active step [m/s].
@@ -78,8 +78,8 @@ def summed_social_work(episode: Episode, *, turn: float = 1.0) -> Array:
     """The sum over active steps that `social_work` multiplies by the control step.
 
     Args:
-        episode: The record.
-        turn: As in `social_force`.
+        episode: Record with the tracks of agents and pedestrians.
+        turn: 1 for the side to which Moussaid et al. let people turn, -1 for the other.
 
     Returns:
         Shape (n_agents,) [m/s^2].

@@ -42,7 +42,7 @@ def minimum_time_to_collision(episode: Episode) -> Array:
     contact gives 0.
 
     Args:
-        episode: The record.
+        episode: Record with the tracks of agents and pedestrians; its scenario gives the radii.
 
     Returns:
         Shape (n_agents,), >= 0; inf for agents that never were on collision course, NaN for agents without an active
