@@ -54,7 +54,7 @@ def check_arrays(episode: "Episode") -> None:
     """Hold every array to its shape and type, and make it read-only.
 
     Args:
-        episode: The record.
+        episode: Record as it was made or read.
 
     Raises:
         EpisodeError: If an array has another shape or type; names it.

@@ -24,7 +24,7 @@ def written_whole(path: str | Path) -> Iterator[Path]:
     The first file that a process writes into a folder clears it of what dead writers left.
 
     Args:
-        path: Target; its folders are made.
+        path: File to be written; its folders are made.
 
     Yields:
         Path to write to, with the target's suffix; there is an empty file.
@@ -100,7 +100,7 @@ def write_whole(path: str | Path, content: bytes) -> Path:
     """Write bytes to a file, whole or not at all.
 
     Args:
-        path: Target; its folders are made.
+        path: File to be written; its folders are made.
         content: All of it.
 
     Returns:
@@ -115,7 +115,7 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
     """Write JSON, equal bytes for equal content.
 
     Args:
-        path: Target.
+        path: JSON file to be written.
         content: JSON values.
     """
     write_whole(path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())

@@ -28,7 +28,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
     one of them appears does not count until it has been apart.
 
     Args:
-        recording: The crowd.
+        recording: Its tracks are those of agents and pedestrians alike.
         scenario: Its draw, radii and time steps.
         scenario_name: Kept in the metadata.
 

@@ -62,7 +62,7 @@ def stoppable() -> Iterator[None]:
 def in_processes(
     function: Callable[..., Result], arguments: Iterable[tuple[object, ...]], *, n_jobs: int
 ) -> Iterator[Result]:
-    """Call a function many times.
+    """Call a function with many arguments, in several processes.
 
     Args:
         function: To be called; it and its results travel between processes.
@@ -70,8 +70,8 @@ def in_processes(
         n_jobs: Processes; 1 for none but this one, -1 for one a core.
 
     Returns:
-        Results as they come, in no order. An exception of a call is raised here. The processes end within a second of
-        this one, however it ends.
+        Results in the order in which the calls end, which differs from one time to the next. An exception of a call is
+        raised here. The processes end within a second of this one, however it ends.
     """
     with _held_back(STOPPING):
         # Processes start here and inherit it: signals are this process's to handle, which then ends them.

@@ -20,7 +20,7 @@ def state_hash(*arrays: Array) -> str:
     """SHA-256 of arrays' bytes.
 
     Args:
-        *arrays: In order.
+        *arrays: Hashed one after the other, so that their order counts.
 
     Returns:
         Hexadecimal digits.
@@ -35,8 +35,8 @@ def episode_metadata(recording: Recording, scenario: Scenario, **rest: Any) -> d
     """All that makes an episode traceable.
 
     Args:
-        recording: The crowd.
-        scenario: The resolved scenario.
+        recording: What was replayed; its name, variant, checksum and reading are kept.
+        scenario: All its settings are kept.
         **rest: Further JSON values: controller, controller_config, scenario_name, steps, state_hash.
 
     Returns:
@@ -56,10 +56,10 @@ def recording_metadata(recording: Recording) -> dict[str, Any]:
     """What tells a recording from others.
 
     Args:
-        recording: The crowd.
+        recording: Its tracks are not looked at, only what is said of them.
 
     Returns:
-        JSON values.
+        JSON values: name, variant, checksum, frame rate and how it was read.
     """
     return {
         "name": recording.name,

@@ -149,7 +149,7 @@ def recorded_series(
     """Recorded motion of some people at the control steps at which they are there.
 
     Args:
-        recording: The crowd.
+        recording: Whose tracks are evaluated.
         index: Indices into it, shape (k,).
         first: First control step of each, shape (k,).
         last: Last control step, included, shape (k,).

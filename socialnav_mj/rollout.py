@@ -32,7 +32,8 @@ def rollout(
         progress: Called now and then with the simulated time that has passed [s].
 
     Returns:
-        The record. Its `metadata["state_hash"]` is the SHA-256 of the simulator's state at every control step.
+        Record of all agents; its `metadata["state_hash"]` is the SHA-256 of the simulator's state at every control
+        step.
 
     Raises:
         PhysicsError: If the simulation became invalid.

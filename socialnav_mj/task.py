@@ -42,9 +42,9 @@ class CrowdTask(base.Task):
         """Prepare the cast and the pedestrians' motion at every physics step.
 
         Args:
-            recording: The crowd.
+            recording: Whose people are replaced and replayed.
             scenario: Its draw, bodies, limits and rules.
-            random: As in dm_control; nothing in an episode is random once the scenario is given.
+            random: Kept for dm_control; nothing in an episode is random once the scenario is given.
         """
         super().__init__(random=random)
         self.recording = recording
@@ -125,7 +125,7 @@ class CrowdTask(base.Task):
 
         Args:
             action: Wheel speeds (left, right), shape (n_slots, 2) [rad/s]; rows of empty slots are ignored.
-            physics: The physics.
+            physics: Takes the commands and the people's paths.
 
         Raises:
             ValueError: If the shape is wrong or a row of an active slot is not finite.
@@ -169,7 +169,7 @@ class CrowdTask(base.Task):
         """What every slot's agent sees; see `socialnav_mj.observation`.
 
         Args:
-            physics: The physics.
+            physics: Not asked: its state was taken after the step.
 
         Returns:
             Arrays with a row a slot.
@@ -205,7 +205,7 @@ class CrowdTask(base.Task):
         """Reward of every slot for the last control step.
 
         Args:
-            physics: The physics.
+            physics: Not asked.
 
         Returns:
             Shape (n_slots,); 0 for slots that were empty.
@@ -213,10 +213,10 @@ class CrowdTask(base.Task):
         return self._reward.copy()
 
     def get_termination(self, physics: Physics) -> float | None:
-        """The episode ends when every agent's run has ended.
+        """The episode ends when every agent's trip has ended.
 
         Args:
-            physics: The physics.
+            physics: Not asked.
 
         Returns:
             0.0 at the end, else None.

@@ -32,7 +32,7 @@ def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed
         path: Of the .safetensors file.
         tensors: By name; random ones if not given.
         features: Name of the feature set.
-        seed: Of the random ones.
+        seed: Seed of the random weights.
         card: Of it, `config` is completed and `sha256` is added.
 
     Returns:

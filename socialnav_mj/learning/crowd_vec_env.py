@@ -54,7 +54,7 @@ class CrowdVecEnv(VecEnv):
             robot_radius: [m].
             pedestrian_radius: [m].
             guide: Controller that `guide_action` asks.
-            seed: Of the draws.
+            seed: Seed from which the seeds of all draws are taken.
         """
         self._guide = make_controller(guide)
         self._recordings, self._shares, self._features = tuple(recordings), tuple(shares), features

@@ -54,7 +54,7 @@ def demonstrate(
     what no robot can do.
 
     Args:
-        recording: The crowd.
+        recording: Whose people, if they move far enough, are the experts.
         features: Feature set.
         scenario: Gives the time step, limits, goal radius.
         minimum_displacement: Of an expert [m].

@@ -63,15 +63,15 @@ class SharedReplayBuffer(ReplayBuffer):
         """Make an empty buffer.
 
         Args:
-            buffer_size: Transitions.
+            buffer_size: Transitions that it holds, of all slots together.
             observation_space: Of a slot.
             action_space: Of a slot.
             device: Of the samples.
             n_envs: Number of slots.
             optimize_memory_usage: Not used.
             features: Of the observations.
-            gamma: Discount.
-            seed: Of sampling.
+            gamma: Discount from one control step to the next.
+            seed: Seed of the choice of transitions.
         """
         super().__init__(buffer_size, observation_space, action_space, device, n_envs=1)
         self.features, self.gamma = features, gamma

@@ -99,7 +99,7 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a table; numbers with six digits, NaN as nothing.
 
     Args:
-        path: Target.
+        path: CSV file to be written.
         rows: All with the columns of the first.
     """
     write_whole(path, csv_bytes(list(rows[0]) if rows else [], rows, number=".6g"))

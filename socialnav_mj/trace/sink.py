@@ -19,7 +19,7 @@ class Sink:
         """Open the file.
 
         Args:
-            path: Target.
+            path: The .rrd file to be written.
             name: Shown by the viewer.
             recording_id: Files with the same id are taken for the same recording.
             blueprint: How the file looks when it is opened.
