@@ -106,13 +106,14 @@ def run(words: list[str], parse: Callable[[list[str]], Any]) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_code_blocks_run_in_their_order(page, here, parse):
+def test_code_blocks_run_in_their_order(page, here, parse, monkeypatch):
     """A Python block that begins with a file's name is written to that file; one marked `text` is not run."""
     names: dict[str, object] = {"__name__": "docs"}
     for place, language, text in blocks(page):
         assert language in {"python", "bash", "text"}, f"{place} is marked {language!r}; allowed: python, bash, text"
         if language == "python" and (file := re.match(r"# (\w+\.py)\n", text)):
             (here / file[1]).write_text(text, encoding="utf-8")
+            monkeypatch.delitem(sys.modules, Path(file[1]).stem, raising=False)  # another test's module of that name
         elif language == "python":
             exec(compile(text, place, "exec", dont_inherit=True), names)
         elif language == "bash":
