@@ -4,6 +4,7 @@ VENV ?= .venv
 OUT ?= runs/demo
 SECONDS ?= 600
 SEED ?= 0
+ROUNDS ?= 30
 
 BIN := $(VENV)/bin
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
@@ -20,13 +21,14 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow fuzz lint format docs clean python-version
+.PHONY: help demo test slow fuzz kill lint format docs clean python-version
 
 help:
 	@echo "make demo     run the four scenarios on the embedded recording; results in $(OUT)"
 	@echo "make test     lint, then the tests"
 	@echo "make slow     the longer checks"
 	@echo "make fuzz     feed damaged files to every reader for SECONDS=$(SECONDS) on all cores"
+	@echo "make kill     kill commands at random moments and repeat them, ROUNDS=$(ROUNDS) times"
 	@echo "make lint     format check, lint, types"
 	@echo "make format   format and mend what can be mended"
 	@echo "make docs     bring the tables of docs/ up to date"
@@ -46,6 +48,9 @@ slow: $(ALL)
 
 fuzz: $(ALL)
 	$(BIN)/python -m tests.fuzz.run --seconds $(SECONDS) --seed $(SEED)
+
+kill: $(ALL)
+	$(BIN)/python -m tests.kill --rounds $(ROUNDS) --seed $(SEED)
 
 lint: $(ALL)
 	$(BIN)/ruff format --check .
