@@ -6,6 +6,7 @@ pace allows: `--rounds 1 --seed K` repeats the round that a failure names.
 """
 
 import argparse
+import atexit
 import json
 import os
 import random
@@ -136,7 +137,7 @@ def strike(process: "subprocess.Popen[str]", blow: Blow, folder: Path, duration:
             seen = now
             if changes >= blow.change:
                 break
-        time.sleep(0.002)
+        time.sleep(0.005)
     ended = process.poll() is not None
     with suppress(ProcessLookupError):
         (os.killpg if blow.to_all else os.kill)(process.pid, blow.number)
@@ -231,6 +232,15 @@ def _without_times(value: Any) -> Any:
 
 
 @lru_cache(maxsize=len(COMMANDS))
+def _inputs(name: str) -> Path:
+    """Folder with what a command needs, made once."""
+    folder = Path(tempfile.mkdtemp(prefix=f"kill_{name}_inputs_"))
+    atexit.register(shutil.rmtree, folder)
+    COMMANDS[name].prepare(folder)
+    return folder
+
+
+@lru_cache(maxsize=len(COMMANDS))
 def undisturbed(name: str) -> tuple[dict[str, Any], float]:
     """What a command leaves that nobody kills, and how long it takes.
 
@@ -245,8 +255,7 @@ def undisturbed(name: str) -> tuple[dict[str, Any], float]:
     """
     with tempfile.TemporaryDirectory() as root:
         folder = Path(root) / "run"
-        folder.mkdir()
-        COMMANDS[name].prepare(folder)
+        shutil.copytree(_inputs(name), folder)
         begin = time.monotonic()
         code = wait(start(name, folder))
         duration = time.monotonic() - begin
@@ -274,8 +283,7 @@ def run_round(seed: int, root: Path, name: str | None = None) -> str:
     name = name or chosen
     expected, duration = undisturbed(name)
     folder = root / "run"
-    folder.mkdir(parents=True)
-    COMMANDS[name].prepare(folder)
+    shutil.copytree(_inputs(name), folder)
     for blow in blows:
         strike(start(name, folder), blow, folder, duration)
     if code := wait(start(name, folder)):
