@@ -11,7 +11,7 @@ WALKING_SPEEDS = (0.5, 2.0)
 """Median speeds of people who walk lie between these [m/s]; of the UCY scenes 0.72 to 1.21."""
 FAR_NEIGHBOUR = 20.0
 """People whose nearest neighbour is farther than this, in the median, are no crowd [m]; students003: 0.74."""
-_LOOKS = 50
+_LOOKS = 20
 """Moments at which neighbours are looked for."""
 
 
@@ -36,7 +36,7 @@ def walking_speed(recording: Recording) -> float:
 
 
 def nearest_neighbour(recording: Recording) -> float:
-    """Median distance to the nearest other person, at 50 moments over the recording, straight between samples.
+    """Median distance to the nearest other person, at 20 moments over the recording, straight between samples.
 
     Args:
         recording: Looked at from its first appearance to its end.
