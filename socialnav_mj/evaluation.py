@@ -14,7 +14,7 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_config, make_controller
 from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import EpisodeError, check_name, read_header
-from socialnav_mj.files import clear_leftovers, write_whole
+from socialnav_mj.files import clear_leftovers, finished_files, write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import recording_metadata
@@ -148,7 +148,9 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
     _check_folder(folder / "episodes", jobs, recording, configurations)
     clear_leftovers(folder / "episodes")
     # Episodes of earlier commands belong to the run as well: they are in its tables.
-    episodes = sorted({job.file_name for job in jobs} | {path.name for path in (folder / "episodes").glob("[!.]*.npz")})
+    episodes = sorted(
+        {job.file_name for job in jobs} | {path.name for path in finished_files(folder / "episodes", ".npz")}
+    )
     run = {"command": command, "controllers": [*configurations], "episodes": episodes}
     write_whole(folder / "run.json", (json.dumps(run, indent=1) + "\n").encode())
     return _run_all(jobs, folder / "episodes", n_jobs)
@@ -234,7 +236,7 @@ def _check_folder(
 ) -> None:
     """A folder holds one recording and one configuration: what is there has to agree with what is asked for."""
     job_of = {job.file_name: job for job in jobs}
-    for path in sorted(folder.glob("[!.]*.npz")):
+    for path in finished_files(folder, ".npz"):
         metadata = read_header(path)["metadata"]
         try:
             job, found = job_of.get(path.name), metadata["scenario"]

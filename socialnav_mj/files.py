@@ -46,6 +46,19 @@ def written_whole(path: str | Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def finished_files(folder: str | Path, suffix: str) -> list[Path]:
+    """Files of a folder that are whole: not those that `written_whole` is writing, or that an interruption left.
+
+    Args:
+        folder: Its own files alone are looked at; it need not be there.
+        suffix: Of their names, such as ".npz".
+
+    Returns:
+        Paths in alphabetical order.
+    """
+    return sorted(Path(folder).glob(f"[!.]*{suffix}"))
+
+
 def clear_leftovers(folder: str | Path) -> None:
     """Remove the temporary files of `written_whole` that dead processes left in a folder.
 

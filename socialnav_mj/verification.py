@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from socialnav_mj.episode import Episode
+from socialnav_mj.files import finished_files
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import package_versions, platform_facts
 from socialnav_mj.recordings import DEFAULT_READING, Reading
@@ -58,8 +59,7 @@ def files_of(path: str | Path) -> list[Path]:
     path = Path(path)
     if path.is_file():
         return [path]
-    files = sorted([*path.glob("episodes/*.npz"), *path.glob("traces/*.rrd")])
-    files = [file for file in files if not file.name.startswith(".")]
+    files = [*finished_files(path / "episodes", ".npz"), *finished_files(path / "traces", ".rrd")]
     if not files:
         raise FileNotFoundError(f"{path}: there is no episodes/*.npz and no traces/*.rrd to verify")
     return files
@@ -171,7 +171,7 @@ def _differing_values(stored: Episode, again: Episode) -> tuple[str, ...]:
 def _count(folder: Path) -> Verdict:
     """Whether the episodes of a folder are those that its evaluation has made."""
     path = folder / RUN_FILE
-    there = {file.name for file in files_of(folder) if file.suffix == ".npz"}
+    there = {file.name for file in finished_files(folder / "episodes", ".npz")}
     try:
         run = read_run_file(path)
     except ValueError as error:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import tasks
 from socialnav_mj.episode import Episode, EpisodeError, check_name
+from socialnav_mj.files import finished_files
 from socialnav_mj.metrics.contacts import pedestrian_overlaps
 from socialnav_mj.metrics.metric import Kind, Metric
 from socialnav_mj.metrics.registry import METRICS, per_agent
@@ -165,7 +166,7 @@ def read_results(
             would be averaged or compared differ in their configuration; the files are named.
     """
     episodes = Path(folder) / "episodes"
-    there = sorted(episodes.glob("[!.]*.npz"))  # not what an interruption left
+    there = finished_files(episodes, ".npz")
     paths = there if files is None else sorted(episodes / name for name in files)
     if not paths:
         raise FileNotFoundError(f"no episodes in {episodes}; expected *.npz files")
