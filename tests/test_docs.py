@@ -164,6 +164,11 @@ def test_links_and_paths_lead_to_files(page):
     assert not lost
 
 
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_no_page_was_left_half_merged(page):
+    assert not re.findall(r"^(?:<{7}|>{7}|\|{7}) .*$", page.read_text(encoding="utf-8"), re.MULTILINE)
+
+
 def test_the_figure_of_the_house_is_current():
     page = PAGE.read_text(encoding="utf-8")
     assert with_figure(page) == page, "draw it anew: python tests/house.py"
