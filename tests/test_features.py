@@ -309,7 +309,7 @@ def test_states_carry_lowered_flags_under_way_and_one_raised_at_the_end(features
 
 def test_feature_sets_are_found_by_name_and_errors_name_them():
     assert feature_set("risk").size == 80 and feature_set("continuous").size == 54
-    with pytest.raises(ValueError, match="unknown feature set 'rsk'; available: continuous, risk"):
+    with pytest.raises(ValueError, match="unknown feature set 'rsk'; available: continuous, companions, risk"):
         feature_set("rsk")
 
 

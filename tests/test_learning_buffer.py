@@ -8,13 +8,17 @@ pytest.importorskip("stable_baselines3")
 
 from gymnasium import spaces  # noqa: E402
 
-from socialnav_mj.features import N_FLAGS, feature_set, mirror_state  # noqa: E402
-from socialnav_mj.learning.reward import RewardNet  # noqa: E402
-from socialnav_mj.learning.shared_buffer import SharedReplayBuffer, mirrored  # noqa: E402
+from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG, N_FLAGS, feature_set, mirror_state  # noqa: E402
+from socialnav_mj.learning.config import TrainingConfig  # noqa: E402
+from socialnav_mj.learning.mirror import Mirror  # noqa: E402
+from socialnav_mj.learning.reward import RewardNet, reward_for  # noqa: E402
+from socialnav_mj.learning.shared_buffer import SharedReplayBuffer  # noqa: E402
 
 FEATURES = feature_set("continuous")
 SIZE = FEATURES.size + N_FLAGS
 GAMMA = 0.9
+REWARD = 0.1
+"""The task's own reward, per tag."""
 TAG = 2
 """A feature that mirroring leaves alone, the distance to the goal: here it says which state this is."""
 
@@ -30,7 +34,7 @@ class Tagged(torch.nn.Module):
         return self.scale * state[..., TAG]
 
 
-def buffer_of(n_slots=3, size=50, reward_net=None) -> SharedReplayBuffer:
+def buffer_of(n_slots=3, size=50, reward_net=None, **changes) -> SharedReplayBuffer:
     buffer = SharedReplayBuffer(
         size,
         spaces.Box(-np.inf, np.inf, (SIZE,), np.float32),
@@ -38,10 +42,9 @@ def buffer_of(n_slots=3, size=50, reward_net=None) -> SharedReplayBuffer:
         "cpu",
         n_envs=n_slots,
         features=FEATURES,
-        gamma=GAMMA,
         seed=0,
     )
-    buffer.reward_net = reward_net or Tagged(1.0)
+    buffer.reward_of = reward_for(TrainingConfig(gamma=GAMMA, **changes), reward_net or Tagged(1.0))
     return buffer
 
 
@@ -59,7 +62,7 @@ def put(buffer, before, after, *, active=None, done=None, truncated=None, log_pr
     infos = [{"active": a, "TimeLimit.truncated": t} for a, t in zip(active, truncated, strict=True)]
     action = np.random.default_rng(2).uniform(-1.0, 1.0, (n, 2)).astype(np.float32)
     log_prob = np.zeros(n) if log_prob is None else np.asarray(log_prob)
-    buffer.store(tagged(before), tagged(after), action, np.asarray(done), infos, log_prob)
+    buffer.store(tagged(before), tagged(after), action, np.asarray(done), infos, log_prob, REWARD * np.asarray(after))
     return action
 
 
@@ -77,7 +80,8 @@ def test_only_slots_that_held_an_agent_are_stored():
 def test_rewards_change_with_the_network_and_nothing_else_does():
     """The same draw twice, before and after a step of the network: rewards are the network's of the next state."""
     torch.manual_seed(0)
-    buffer = buffer_of(reward_net=RewardNet(SIZE, (8,)))
+    network = RewardNet(SIZE, (8,))
+    buffer = buffer_of(reward_net=network)
     for k in range(5):
         put(buffer, np.arange(3) + k, np.arange(3) + k + 1)
     samples = []
@@ -85,10 +89,10 @@ def test_rewards_change_with_the_network_and_nothing_else_does():
         buffer.random = np.random.default_rng(7)
         samples.append(buffer.sample(32))
         with torch.no_grad():
-            expected = buffer.reward_net(samples[-1].next_observations)
+            expected = network(samples[-1].next_observations)
         torch.testing.assert_close(samples[-1].rewards[:, 0], expected)
-        optimizer = torch.optim.SGD(buffer.reward_net.parameters(), lr=0.1)
-        buffer.reward_net(samples[-1].next_observations).sum().backward()
+        optimizer = torch.optim.SGD(network.parameters(), lr=0.1)
+        network(samples[-1].next_observations).sum().backward()
         optimizer.step()
     first, second = samples
     for name in ("observations", "actions", "next_observations", "dones"):
@@ -106,6 +110,26 @@ def test_absorbing_states_are_worth_their_reward_for_ever_and_deadlines_bootstra
     for tag, reward, done in zip(samples.next_observations[:, TAG], samples.rewards, samples.dones, strict=True):
         by_tag.setdefault(int(tag), set()).add((round(float(reward), 4), float(done)))
     assert by_tag == {1: {(1.0, 0.0)}, 2: {(20.0, 1.0)}, 3: {(3.0, 0.0)}}
+
+
+def test_plain_rewards_are_the_tasks_own_or_constants():
+    """Tags 1, 2, 3 on the way, arrived and collided; a constant is paid for ever in the absorbing states."""
+    for changes, expected in (
+        ({"reward": "task"}, {1: 0.1, 2: 0.2, 3: 0.3}),
+        (
+            {"reward": "constant", "step_reward": -0.02, "goal_reward": 0.3, "collision_reward": -0.5},
+            {1: -0.02, 2: 3.0, 3: -5.0},
+        ),
+    ):
+        buffer = buffer_of(**changes)
+        put(buffer, [0, 0, 0], [1, 2, 3], done=[False, True, True])
+        buffer.next_observations[1, 0, GOAL_FLAG] = buffer.next_observations[2, 0, COLLISION_FLAG] = 1.0
+        buffer.next_observations[0, 0, [GOAL_FLAG, COLLISION_FLAG]] = 0.0
+        buffer.next_observations[1, 0, COLLISION_FLAG] = buffer.next_observations[2, 0, GOAL_FLAG] = 0.0
+        samples = buffer.sample(64)
+        tags = samples.next_observations[:, TAG].long().tolist()
+        found = dict(zip(tags, samples.rewards[:, 0].tolist(), strict=True))
+        assert found == pytest.approx(expected, abs=1e-5)
 
 
 def test_samples_are_mirrored_as_a_whole_half_of_the_time():
@@ -127,13 +151,13 @@ def test_samples_are_mirrored_as_a_whole_half_of_the_time():
     assert 150 < turned < 250  # standard deviation 10
 
 
-def test_mirrored_turns_the_chosen_rows_only_and_keeps_its_input():
+def test_mirror_turns_the_chosen_rows_only_and_keeps_its_input():
     states = tagged([0, 1, 2])
     kept = states.copy()
-    found = mirrored(FEATURES, states, np.array([False, True, False]))
+    found = Mirror(FEATURES)(states, np.array([False, True, False]))
     np.testing.assert_array_equal(states, kept)
     np.testing.assert_array_equal(found[[0, 2]], states[[0, 2]])
-    np.testing.assert_allclose(found[1], mirror_state(FEATURES, states[1]), atol=1e-7)
+    np.testing.assert_array_equal(found[1], mirror_state(FEATURES, states[1]).astype(np.float32))
     assert found.dtype == np.float32
 
 

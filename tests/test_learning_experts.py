@@ -6,7 +6,7 @@ from scenes import TINY, recording_of, stand, walk
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.features import FEATURE_SETS, Continuous
-from socialnav_mj.learning.experts import Demonstrations, demonstrate
+from socialnav_mj.learning.experts import Demonstrations, ExpertSampler, demonstrate, occupied_sectors
 from socialnav_mj.recordings import load_recording
 
 PROXIMITY, CLOSING = 6, 18
@@ -14,7 +14,7 @@ GOAL, COLLISION = [1.0, 0.0], [0.0, 1.0]
 
 
 def demonstrations(
-    *walks, features=None, contact_distance=0.25, clearance=0.0, minimum_displacement=2.0
+    *walks, features=None, contact_distance=0.25, clearance=0.0, minimum_displacement=2.0, companions_seen=False
 ) -> Demonstrations:
     return demonstrate(
         recording_of(*walks),
@@ -23,6 +23,7 @@ def demonstrations(
         minimum_displacement=minimum_displacement,
         contact_distance=contact_distance,
         clearance=clearance,
+        companions_seen=companions_seen,
     )
 
 
@@ -141,3 +142,38 @@ def test_demonstrations_do_not_change_when_the_crowd_is_turned_and_moved(feature
 
 def vars_of(recording):
     return {name: getattr(recording, name) for name in recording.__dataclass_fields__}
+
+
+def test_companions_are_seen_only_if_asked_for_and_told_apart_by_their_own_features():
+    """Two walk side by side, 0.6 m apart; a stranger stands ahead of them."""
+    walks = (
+        walk([(0.0, 0.0), (6.0, 0.0)], 1.0),
+        walk([(0.0, 0.6), (6.0, 0.6)], 1.0),
+        stand((9.0, 0.0), 0.0, 6.0),
+    )
+    of_features = {name: FEATURE_SETS[name] for name in ("continuous", "companions")}
+    hidden = demonstrations(*walks, features=of_features["continuous"])
+    seen = demonstrations(*walks, features=of_features["continuous"], companions_seen=True)
+    apart = demonstrations(*walks, features=of_features["companions"], companions_seen=True)
+    beside = PROXIMITY + 3  # the sector at the left
+    assert not hidden.running[0, beside] and seen.running[0, beside] == pytest.approx(np.exp(-0.3))
+    np.testing.assert_array_equal(apart.running[:, :54], hidden.running[:, :54])
+    assert apart.running[0, 54 + 3] == pytest.approx(np.exp(-0.3))
+    assert np.count_nonzero(apart.running[0, 54:66]) == 1
+    unseen = demonstrations(*walks, features=of_features["companions"])
+    assert not unseen.running[:, 54:66].any()
+
+
+def test_matched_experts_have_as_many_occupied_sectors():
+    """Experts with 0 or 3 occupied sectors; a neighbour at arm's length counts for none."""
+    free, full, near = np.zeros((3, 56))
+    full[PROXIMITY : PROXIMITY + 3] = np.exp(-1.5)
+    near[PROXIMITY] = np.exp(-0.5)
+    np.testing.assert_array_equal(occupied_sectors(np.stack([free, full, near])), [0, 3, 0])
+    experts = Demonstrations(running=np.stack([free, full, full, full]), absorbed=np.eye(56)[-2:-1])
+    sampler = ExpertSampler(experts, Continuous())
+    random = np.random.default_rng(0)
+    like = np.stack([full] * 10 + [free] * 40 + [full] * 50)
+    np.testing.assert_array_equal(occupied_sectors(sampler(100, 0.1, random, like)[10:]), [0] * 40 + [3] * 50)
+    np.testing.assert_array_equal(sampler(100, 0.1, random, like)[:10], np.tile(np.eye(56)[-2], (10, 1)))
+    assert abs((occupied_sectors(sampler(1000, 0.0, random)) == 3).mean() - 0.75) < 0.05

@@ -18,10 +18,11 @@ from socialnav_mj.controllers.replay_irl import load_policy  # noqa: E402
 from socialnav_mj.features import feature_set  # noqa: E402
 from socialnav_mj.learning.config import TrainingConfig  # noqa: E402
 from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv  # noqa: E402
-from socialnav_mj.learning.experts import demonstrate  # noqa: E402
+from socialnav_mj.learning.experts import Demonstrations, ExpertSampler, demonstrate  # noqa: E402
 from socialnav_mj.learning.policy_file import save_policy  # noqa: E402
 from socialnav_mj.learning.replay_irl import ReplayIRL  # noqa: E402
-from socialnav_mj.learning.training import is_kept, train  # noqa: E402
+from socialnav_mj.learning.training import train  # noqa: E402
+from socialnav_mj.learning.validation import is_kept  # noqa: E402
 from socialnav_mj.recordings import load_recording  # noqa: E402
 
 SMALL = TrainingConfig(
@@ -56,6 +57,7 @@ def model_of(config: TrainingConfig) -> ReplayIRL:
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
+        turn_limit=config.turn_limit,
         guide=config.guide,
         seed=config.seed,
     )
@@ -155,20 +157,33 @@ def test_log_density_of_the_actors_actions_is_its_squashed_normals(monkeypatch):
 # What is learned
 
 
-@pytest.mark.parametrize("partition", ["fused", "importance", "segment"])
-def test_reward_steps_prefer_the_experts_states_to_the_buffers(partition):
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"partition": "fused"},
+        {"partition": "importance"},
+        {"partition": "segment"},
+        {"matching": "density"},
+        {"spectral_norm": True},
+    ],
+    ids=str,
+)
+def test_reward_steps_prefer_the_experts_states_to_the_buffers(changes):
     """The experts stand near their goals, the buffer far from them; no step of the environment is needed."""
-    config = small(partition=partition, absorbing_share=0.0, segment_length=3)
+    config = small(absorbing_share=0.0, segment_length=3, **changes)
     model = model_of(config)
     model.set_logger(quiet())
     size = model.features.size + 2
     near, far = np.zeros((2, size), dtype=np.float32)
     near[3], far[2] = 1.0, 1.0
-    model.running = np.tile(near, (20, 1))
+    experts = Demonstrations(running=np.tile(near, (20, 1)), absorbed=np.zeros((1, size)))
+    model.experts = ExpertSampler(experts, model.features)
     infos = [{"active": True}] * 3
     for _ in range(50):
         states = np.tile(far, (3, 1))
-        model.replay_buffer.store(states, states, np.zeros((3, 2)), np.zeros(3, dtype=bool), infos, np.zeros(3))
+        model.replay_buffer.store(
+            states, states, np.zeros((3, 2)), np.zeros(3, dtype=bool), infos, np.zeros(3), np.zeros(3)
+        )
     steps, before = model.num_timesteps, difference(model, near, far)
     for _ in range(100):
         model.reward_step()
@@ -201,17 +216,45 @@ def test_reward_steps_come_every_so_many_updates():
     assert calls == [4, 8, 12, 16, 20]
 
 
+@pytest.mark.parametrize("reward", ["constant", "task"])
+def test_plain_rewards_leave_the_reward_network_alone(reward):
+    config = small(guided_scene_steps=10, reward=reward)
+    model = model_of(config)
+    before = {name: value.clone() for name, value in model.reward_net.state_dict().items()}
+    model.learn(20 * config.n_slots, log_interval=None)
+    assert model.updates > 0
+    assert all(torch.equal(before[name], value) for name, value in model.reward_net.state_dict().items())
+
+
+def test_reward_of_spectral_norm_is_the_networks_in_numpy_too(tmp_path):
+    config = small(spectral_norm=True, guided_scene_steps=10)
+    model = learned(config, 20)
+    save_policy(model, tmp_path / "p.safetensors", {"config": config.as_dict()})
+    state = np.random.default_rng(0).normal(size=(50, model.features.size + 2))
+    model.reward_net.eval()
+    with torch.no_grad():
+        expected = model.reward_net(torch.as_tensor(state, dtype=torch.float32)).numpy()
+    np.testing.assert_allclose(load_policy(str(tmp_path / "p.safetensors")).reward_of(state), expected, atol=1e-5)
+    for layer in (module for module in model.reward_net.layers if isinstance(module, torch.nn.Linear)):
+        assert float(torch.linalg.matrix_norm(layer.weight.detach(), 2)) < 1.2
+
+
+def test_crowd_turns_as_fast_as_the_turn_limit_says():
+    for turn_limit, rate in (("per_step", np.pi / 6.0 / 0.2), ("per_second", np.pi / 6.0)):
+        assert model_of(small(turn_limit=turn_limit)).crowd._limits.max_yaw_rate == pytest.approx(rate)
+
+
 def test_average_weighs_each_updates_actor_by_its_number():
     """Power 1: the actor after update t counts as t."""
     config = small(guided_scene_steps=10, averaging_power=1.0)
     model = model_of(config)
     seen = []
-    keep = model.average.update_parameters
-    model.average.update_parameters = lambda actor: (seen.append(actor.mu.bias.detach().clone()), keep(actor))
+    keep = model._average_actor
+    model._average_actor = lambda: (seen.append(model.actor.mu.bias.detach().clone()), keep())
     model.learn(15 * config.n_slots, log_interval=None)
     expected = sum(number * bias for number, bias in enumerate(seen, start=1)) / sum(range(1, len(seen) + 1))
     assert len(seen) == 5 and not torch.equal(seen[0], seen[-1])
-    torch.testing.assert_close(model.average.module.mu.bias, expected)
+    torch.testing.assert_close(model.average.mu.bias, expected)
 
 
 # Saving
@@ -231,7 +274,7 @@ def test_saved_policy_acts_as_the_average_actor(features, tmp_path):
     np.testing.assert_array_equal(action, policies[1].action(state))
     latest, _ = model.predict(state.astype(np.float32), deterministic=True)
     assert np.abs(action - latest).max() > 1e-4
-    model.actor.load_state_dict(model.average.module.state_dict())
+    model.actor.load_state_dict(model.average.state_dict())
     expected, _ = model.predict(state.astype(np.float32), deterministic=True)
     np.testing.assert_allclose(action, expected, atol=1e-6)
     with torch.no_grad():
@@ -367,7 +410,7 @@ def test_last_late_checkpoint_within_a_standard_error_of_the_best_is_kept(tmp_pa
     """Of 100 agents 0.9 +- 0.03 arrive at best; 0.88 is within that, 0.86 is not, and 0.99 came early."""
     success = iter([0.99, 0.3, 0.9, 0.88, 0.86])
 
-    def validation(path, recordings, *, part, shares):
+    def validation(path, recordings, *, part, shares, turn_limit):
         value = next(success) if path.name == "latest.safetensors" else 0.0
         return {"success": value, "intrusion_share": 0.2, "time_under_way": 5.0, "n_agents": 100.0}
 
@@ -408,6 +451,9 @@ def test_configuration_goes_through_json():
     ("changes", "message"),
     [
         ({"partition": "exact"}, "partition = 'exact' is not allowed; allowed: fused, importance, segment"),
+        ({"reward": "mine"}, "reward = 'mine' is not allowed; allowed: learned, constant, task"),
+        ({"turn_limit": "never"}, "turn_limit = 'never' is not allowed; allowed: per_step, per_second"),
+        ({"matching": "density", "features": "risk"}, "matching = 'density' is not allowed with features = 'risk'"),
         ({"scene_steps": 0}, "scene_steps = 0 is not allowed"),
         ({"n_slots": -1}, "n_slots = -1 is not allowed"),
         ({"kept_from": 1.0}, "kept_from = 1.0 is not allowed; allowed: numbers in [0, 1)"),

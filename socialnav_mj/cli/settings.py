@@ -1,4 +1,4 @@
-"""Everything that can be set of a scenario, as options of a command: one for each field of `Scenario` and `Robot`."""
+"""Everything that can be set of a scenario or of a training, as options of a command."""
 
 import ast
 import inspect
@@ -8,6 +8,7 @@ from typing import Annotated, Any, get_type_hints
 import tyro
 
 from socialnav_mj.config import SETTINGS, Robot, Scenario
+from socialnav_mj.learning.config import TrainingConfig
 
 _OF_THE_COMMAND = ("share", "seed")
 """What `--scenarios` and `--seed` say."""
@@ -43,6 +44,13 @@ def _options(kind: type, prefix: str = "") -> dict[str, tuple[Any, Any]]:
         if own.default is not MISSING
     }
 
+
+TrainingSettings = make_dataclass(
+    "TrainingSettings",
+    [(name, *option) for name, option in _options(TrainingConfig).items() if name != "datasets"],
+    frozen=True,
+    kw_only=True,
+)
 
 _ALL = {**_options(Scenario), **_options(Robot, "robot_")}
 Settings = make_dataclass(

@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +10,8 @@ import tyro
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
 from socialnav_mj.cli.console import counted_progress, errors, follow, say
+from socialnav_mj.cli.settings import TrainingSettings
+from socialnav_mj.learning.config import TrainingConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,36 +24,23 @@ class Train:
     """Recordings to learn from: names in the catalogue, or paths."""
     data_dir: Folder = None
     """Where recordings are looked for first."""
-    features: Literal["continuous", "risk"] = "continuous"
-    """Feature set of policy and reward."""
-    partition: Literal["fused", "importance", "segment"] = "fused"
-    """Estimate of the partition function."""
-    seed: int = 0
-    """Training seed: of networks, exploration, sampling and draws."""
-    scene_steps: int | None = None
-    """Control steps of the training scene; the committed configuration's by default."""
+    settings: Annotated[object, tyro.conf.arg(constructor=TrainingSettings)] = field(default_factory=TrainingSettings)
+    """Settings of the training."""
     out: Folder = None
     """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
 
     def run(self) -> None:
         """Train behind a bar, print every validation, and say where the chosen policy is."""
         try:
-            from socialnav_mj.learning.config import TrainingConfig
             from socialnav_mj.learning.training import Progress as Step
             from socialnav_mj.learning.training import train
         except ImportError as error:
             raise RuntimeError(
                 f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
             ) from error
-        config = TrainingConfig(
-            datasets=self.dataset,
-            features=self.features,
-            partition=self.partition,
-            seed=self.seed,
-            scene_steps=self.scene_steps or TrainingConfig.scene_steps,
-        )
+        config = TrainingConfig(datasets=self.dataset, **vars(self.settings))
         label = "+".join(Path(name).stem for name in self.dataset)
-        out = self.out or Path("runs") / "train" / f"{label}_{self.features}_seed{self.seed}"
+        out = self.out or Path("runs") / "train" / f"{label}_{config.features}_seed{config.seed}"
         with counted_progress() as progress:
             bar = progress.add_task("scene steps", total=config.scene_steps)
 

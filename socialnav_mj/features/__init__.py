@@ -4,6 +4,7 @@ Everything is taken from an observation in the agent's own frame (see `socialnav
 change when the scene is moved or turned. Pedestrians and other agents are people alike.
 """
 
+from socialnav_mj.features.companions import Companions
 from socialnav_mj.features.continuous import SIGHT, Continuous
 from socialnav_mj.features.risk import Risk
 from socialnav_mj.features.sets import FEATURE_SETS, FeatureSet, feature_set
@@ -24,6 +25,7 @@ __all__ = [
     "HORIZON",
     "N_FLAGS",
     "SIGHT",
+    "Companions",
     "Continuous",
     "FeatureSet",
     "Risk",

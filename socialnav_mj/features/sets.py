@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from socialnav_mj.features.companions import Companions
 from socialnav_mj.features.continuous import Continuous
 from socialnav_mj.features.risk import Risk
 from socialnav_mj.features.view import View
@@ -22,14 +23,14 @@ class FeatureSet(Protocol):
         """Features of the mirrored scene (left and right exchanged), shape (..., size)."""
 
 
-FEATURE_SETS: dict[str, FeatureSet] = {"continuous": Continuous(), "risk": Risk()}
+FEATURE_SETS: dict[str, FeatureSet] = {"continuous": Continuous(), "companions": Companions(), "risk": Risk()}
 
 
 def feature_set(name: str) -> FeatureSet:
     """The feature set that a policy's card or a training's configuration names.
 
     Args:
-        name: "continuous" or "risk".
+        name: A key of `FEATURE_SETS`.
 
     Returns:
         The one object of that set; it holds no state.

@@ -28,6 +28,8 @@ class View:
     """(n, p, 2) relative to the agent's own velocity [m/s]."""
     present: NDArray[np.bool_]
     """(n, p)"""
+    companion: NDArray[np.bool_] | None = None
+    """(n, p) which of those present walk with whoever sees them; None if nobody does, as for every agent."""
 
 
 def view_of(observation: Mapping[str, NDArray[Any]], rows: NDArray[np.int64]) -> View:

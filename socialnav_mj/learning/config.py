@@ -3,9 +3,12 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
+from socialnav_mj.config import TurnLimit
 from socialnav_mj.features import feature_set
 
 Partition = Literal["fused", "importance", "segment"]
+Reward = Literal["learned", "constant", "task"]
+Matching = Literal["none", "density"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +28,8 @@ class TrainingConfig:
     seed: int = 0
     """Of networks, exploration, sampling and draws."""
 
+    turn_limit: TurnLimit = "per_step"
+    """Reading of the paper's turn limit, in training and validation."""
     scene_steps: int = 15_000
     """Control steps of the training scene; every agent under way gives a transition at each."""
     shares: tuple[float, ...] = (0.1, 0.2, 0.3)
@@ -65,6 +70,23 @@ class TrainingConfig:
     buffer_size: int = 300_000
     """Transitions that the shared replay buffer holds."""
 
+    reward: Reward = "learned"
+    """What SAC earns: the learned reward; "constant": `step_reward` at every step, `goal_reward` and `collision_reward`
+    for ever in the absorbing states; "task": the tasks' own (progress, arrival, collision), once. The last two learn
+    nothing from people and are there for comparison."""
+    step_reward: float = 0.0
+    """Of every step under way, for reward="constant"."""
+    goal_reward: float = 0.35
+    """Of every step at the goal, for reward="constant"; about what is learned."""
+    collision_reward: float = -0.55
+    """Of every step after a collision, for reward="constant"; about what is learned."""
+    matching: Matching = "none"
+    """Experts of a reward step: drawn from all, or for each state of the policy one at as many occupied sectors beyond
+    1.5 m ("density"), so that the reward cannot tell people from agents by how full the place is."""
+    companions_seen: bool = False
+    """Whether experts see their companions, as they see everybody else or, with features="companions", apart."""
+    spectral_norm: bool = False
+    """Bound every layer of the reward network to gain 1 (Miyato et al. 2018, doi 10.48550/arXiv.1802.05957)."""
     partition: Partition = "fused"
     """Estimate of log Z, see `socialnav_mj.learning.reward`."""
     segment_length: int = 8
@@ -100,10 +122,16 @@ class TrainingConfig:
     1984)."""
 
     def __post_init__(self) -> None:
-        if self.partition not in get_args(Partition):
-            raise ValueError(
-                f"partition = {self.partition!r} is not allowed; allowed: {', '.join(get_args(Partition))}"
-            )
+        for name, kind in (
+            ("partition", Partition),
+            ("reward", Reward),
+            ("matching", Matching),
+            ("turn_limit", TurnLimit),
+        ):
+            if getattr(self, name) not in get_args(kind):
+                raise ValueError(
+                    f"{name} = {getattr(self, name)!r} is not allowed; allowed: {', '.join(get_args(kind))}"
+                )
         for name in (
             "scene_steps",
             "n_slots",
@@ -115,6 +143,10 @@ class TrainingConfig:
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: integers >= 1")
         feature_set(self.features)
+        if self.matching == "density" and self.features == "risk":
+            raise ValueError(
+                "matching = 'density' is not allowed with features = 'risk', which see 1.3 m; allowed: 'none'"
+            )
         for name in ("gamma", "kept_from"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: numbers in [0, 1)")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from socialnav_mj.cast import NOBODY, cast_recording
-from socialnav_mj.config import Robot, Scenario
+from socialnav_mj.config import Robot, Scenario, TurnLimit
 from socialnav_mj.controllers import Limits, make_controller
 from socialnav_mj.environment import Environment, build_environment
 from socialnav_mj.episode import Outcome
@@ -41,6 +41,7 @@ class CrowdVecEnv(VecEnv):
         n_slots: int,
         robot_radius: float,
         pedestrian_radius: float,
+        turn_limit: TurnLimit = "per_step",
         guide: str,
         seed: int,
     ) -> None:
@@ -53,13 +54,17 @@ class CrowdVecEnv(VecEnv):
             n_slots: Number of environments; draws that need more are passed over.
             robot_radius: [m].
             pedestrian_radius: [m].
+            turn_limit: Of the agents.
             guide: Controller that `guide_action` asks.
             seed: Seed from which the seeds of all draws are taken.
         """
         self._guide = make_controller(guide)
         self._recordings, self._shares, self._features = tuple(recordings), tuple(shares), features
         self._scenario = Scenario(
-            robot=Robot(radius=robot_radius), pedestrian_radius=pedestrian_radius, on_collision="retire"
+            robot=Robot(radius=robot_radius),
+            pedestrian_radius=pedestrian_radius,
+            turn_limit=turn_limit,
+            on_collision="retire",
         )
         self._random = np.random.default_rng(seed)
         self._scenes = 0

@@ -1,15 +1,28 @@
 """Demonstrations: the recorded people as they would have seen the scene from an agent's place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG, FeatureSet, View, absorbing_state, running_state
+from socialnav_mj.features import (
+    COLLISION_FLAG,
+    GOAL_FLAG,
+    Continuous,
+    FeatureSet,
+    View,
+    absorbing_state,
+    running_state,
+)
 from socialnav_mj.geometry import Array, to_agent_frame, wrap_angle
+from socialnav_mj.learning.mirror import Mirror
 from socialnav_mj.recordings import Recording
 from socialnav_mj.recordings.companions import companions
+
+_ARMS_LENGTH = 1.5
+"""Whoever is nearer counts for nearness and not for density [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,11 +58,12 @@ def demonstrate(
     minimum_displacement: float,
     contact_distance: float,
     clearance: float,
+    companions_seen: bool = False,
 ) -> Demonstrations:
     """States of everybody who goes somewhere.
 
-    A person's companions (see `socialnav_mj.recordings.companions`) are not among those it sees: it keeps near them on
-    purpose. Runs end as an agent's: at the goal radius, or at the first contact with
+    A person's companions (see `socialnav_mj.recordings.companions`) are not among those it sees unless asked for: it
+    keeps near them on purpose. Runs end as an agent's: at the goal radius, or at the first contact with
     somebody who is no companion. Speeds are clipped to the robot's limits, so that the reward does not ask for
     what no robot can do.
 
@@ -59,7 +73,8 @@ def demonstrate(
         scenario: Gives the time step, limits, goal radius.
         minimum_displacement: Of an expert [m].
         contact_distance: Between the centres of two people who touch [m].
-        clearance: States in which somebody is nearer than this are left out [m].
+        clearance: States in which a stranger is nearer than this are left out [m].
+        companions_seen: Whether an expert sees its companions too.
 
     Returns:
         The demonstrations.
@@ -96,6 +111,9 @@ def demonstrate(
             view = _view(
                 recording, crowd.position[k], crowd.velocity[k], crowd.heading[k], turn, rows, here, apart, scenario
             )
+            if companions_seen:
+                others = here != rows[:, None]
+                view = replace(view, present=others, companion=others & ~view.present)
             running.append(running_state(features(view)))
     if not running:
         raise ValueError(
@@ -137,3 +155,61 @@ def _view(
         velocity=to_agent_frame(velocity[here][None], facing[:, None]) - own,
         present=apart[np.ix_(rows, here)],
     )
+
+
+class ExpertSampler:
+    """Batches of expert states for the reward step."""
+
+    def __init__(self, experts: Demonstrations, features: FeatureSet) -> None:
+        """Sort the states by how full the place is.
+
+        Args:
+            experts: At least one state of each kind.
+            features: Of the states.
+        """
+        self._mirror = Mirror(features)
+        self._running = experts.running.astype(np.float32)
+        self._absorbed = experts.absorbed.astype(np.float32)
+        occupied = occupied_sectors(self._running)
+        of_each = [np.flatnonzero(occupied == count) for count in range(Continuous.n_sectors + 1)]
+        filled = np.flatnonzero([len(rows) > 0 for rows in of_each])
+        self._alike = [of_each[filled[np.abs(filled - count).argmin()]] for count in range(len(of_each))]
+        """Number of occupied sectors: rows of the states that have as many, or as nearly as any."""
+
+    def __call__(
+        self, count: int, absorbing_share: float, random: np.random.Generator, like: NDArray[Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Draw states, each mirrored with probability 1/2.
+
+        Args:
+            count: Number of states.
+            absorbing_share: Share of them that is absorbing; they come first.
+            random: Generator to draw with.
+            like: States of the policy, shape (count, size), of which each running one has an expert's state at as many
+                occupied sectors drawn for it; None for states drawn from all.
+
+        Returns:
+            Shape (count, size).
+        """
+        absorbed = round(count * absorbing_share)
+        ends = self._absorbed[random.integers(len(self._absorbed), size=absorbed)]
+        if like is None:
+            rows = random.integers(len(self._running), size=count - absorbed)
+        else:
+            pools = [self._alike[number] for number in occupied_sectors(like[absorbed:])]
+            shares = random.random(len(pools))
+            rows = np.array([pool[int(x * len(pool))] for pool, x in zip(pools, shares, strict=True)], dtype=np.int64)
+        return self._mirror(np.concatenate([ends, self._running[rows]]), random.random(count) < 0.5)
+
+
+def occupied_sectors(state: NDArray[Any]) -> NDArray[np.int64]:
+    """How full the place is beyond arm's length, whoever is near.
+
+    Args:
+        state: States of the set "continuous" or "companions", shape (n, size).
+
+    Returns:
+        Number of sectors whose nearest person is more than 1.5 m and at most 6 m away, shape (n,).
+    """
+    proximity = state[:, 6 : 6 + Continuous.n_sectors]
+    return ((proximity > 0.0) & (proximity < np.exp(-0.5 * _ARMS_LENGTH))).sum(axis=1)

@@ -20,7 +20,7 @@ def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
         path: Of the .safetensors file; the card is written beside it.
         card: JSON values; the weights' sha256 is added.
     """
-    actor = model.average.module
+    actor = model.average
     assert isinstance(actor, Actor)
     tensors = _linear_layers("actor", [*actor.latent_pi, actor.mu])
     tensors |= _linear_layers("reward", list(model.reward_net.layers))
@@ -32,7 +32,7 @@ def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
 def _linear_layers(network: str, modules: list[nn.Module]) -> dict[str, Tensor]:
     linear = [module for module in modules if isinstance(module, nn.Linear)]
     return {
-        f"{network}.{i}.{name}": parameter.detach().clone()
+        f"{network}.{i}.{name}": getattr(layer, name).detach().clone()
         for i, layer in enumerate(linear)
-        for name, parameter in layer.named_parameters()
+        for name in ("weight", "bias")
     }

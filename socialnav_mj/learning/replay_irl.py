@@ -8,6 +8,8 @@ step.
 import json
 import math
 from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import asdict
 from time import perf_counter
 from typing import Any
 
@@ -18,20 +20,21 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
 from stable_baselines3.common.noise import ActionNoise
-from torch.optim.swa_utils import AveragedModel
 
 from socialnav_mj.features import FeatureSet
 from socialnav_mj.learning.config import TrainingConfig
 from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
-from socialnav_mj.learning.experts import Demonstrations
+from socialnav_mj.learning.experts import Demonstrations, ExpertSampler
 from socialnav_mj.learning.reward import (
     RewardNet,
     gradient_penalty,
     irl_loss,
     log_partition_fused,
     log_partition_importance,
+    reward_for,
 )
-from socialnav_mj.learning.shared_buffer import SharedReplayBuffer, mirrored
+from socialnav_mj.learning.sac_update import SacUpdate
+from socialnav_mj.learning.shared_buffer import SharedReplayBuffer
 
 
 class ReplayIRL(SAC):
@@ -62,22 +65,22 @@ class ReplayIRL(SAC):
             train_freq=(1, "step"),
             gradient_steps=config.updates_per_scene_step,
             replay_buffer_class=SharedReplayBuffer,
-            replay_buffer_kwargs={"features": features, "gamma": config.gamma, "seed": config.seed},
+            replay_buffer_kwargs={"features": features, "seed": config.seed},
             policy_kwargs={"net_arch": list(config.hidden), "optimizer_kwargs": {"fused": True}},
             seed=config.seed,
             device="cpu",
         )
         size = int(np.prod(env.observation_space.shape or ()))
-        self.reward_net = RewardNet(size, config.hidden)
+        self.reward_net = RewardNet(size, config.hidden, spectral=config.spectral_norm)
         self.reward_optimizer = torch.optim.AdamW(
             self.reward_net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay, fused=True
         )
-        self.replay_buffer.reward_net = self.reward_net
-        self.average = AveragedModel(self.actor, avg_fn=self._averaged)
+        self.replay_buffer.reward_of = reward_for(config, self.reward_net)
+        self.average = deepcopy(self.actor).requires_grad_(False)
         """The actor's average over the updates: the policy that is validated and kept."""
+        self._update = SacUpdate(self)
         self.random = np.random.default_rng(config.seed + 1)
-        self.running = experts.running.astype(np.float32)
-        self.absorbed = experts.absorbed.astype(np.float32)
+        self.experts = ExpertSampler(experts, features)
         self.seconds = {"sac": 0.0, "reward": 0.0}
         """CPU-bound time spent so far, by kind [s]."""
         self.updates = 0
@@ -88,10 +91,13 @@ class ReplayIRL(SAC):
         """Control steps of the training scene so far; SB3 counts one for every slot."""
         return self.num_timesteps // self.n_envs
 
-    def _averaged(self, average: torch.Tensor, actor: torch.Tensor, count: torch.Tensor | int) -> torch.Tensor:
-        """Polynomial-decay average of one more than `count` values, of which the last is the actor's."""
+    @torch.no_grad()
+    def _average_actor(self) -> None:
+        """Let the average take the actor in as update `updates`: polynomial-decay averaging."""
         power = self.config.averaging_power
-        return average.lerp(actor, (power + 1.0) / (float(count) + 1.0 + power))
+        averages: list[torch.Tensor] = list(self.average.parameters())
+        actor: list[torch.Tensor] = list(self.actor.parameters())
+        torch._foreach_lerp_(averages, actor, (power + 1.0) / (self.updates + power))
 
     def _sample_action(
         self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1
@@ -129,7 +135,7 @@ class ReplayIRL(SAC):
             replay_buffer: The shared buffer.
             buffer_action: In [-1, 1], shape (n_slots, 2).
             new_obs: Shape (n_slots, size).
-            reward: Not used.
+            reward: The task's own, shape (n_slots,).
             dones: Shape (n_slots,).
             infos: Of the crowd.
         """
@@ -140,7 +146,7 @@ class ReplayIRL(SAC):
         before = self._last_obs
         assert isinstance(before, np.ndarray)
         log_prob = self._log_prob(before, buffer_action)
-        replay_buffer.store(before, next_obs, buffer_action, dones, infos, log_prob)
+        replay_buffer.store(before, next_obs, buffer_action, dones, infos, log_prob, reward)
         self._last_obs = self._last_original_obs = new_obs
 
     def _log_prob(self, observation: NDArray[Any], action: NDArray[Any]) -> NDArray[Any]:
@@ -160,26 +166,31 @@ class ReplayIRL(SAC):
             gradient_steps: SAC updates.
             batch_size: Of SAC.
         """
+        optimizers = [self.actor.optimizer, self.critic.optimizer, self._update.temperature_optimizer]
+        self._update_learning_rate(optimizers)
         for _ in range(gradient_steps):
             begin = perf_counter()
-            super().train(1, batch_size)
-            self.average.update_parameters(self.actor)
+            losses = self._update(self.replay_buffer.sample(batch_size))
             self.updates += 1
+            self._average_actor()
             self.seconds["sac"] += perf_counter() - begin
-            if self.updates % self.config.updates_per_reward_step == 0:
+            if self.config.reward == "learned" and self.updates % self.config.updates_per_reward_step == 0:
                 begin = perf_counter()
                 self.reward_step()
                 self.seconds["reward"] += perf_counter() - begin
+        self._n_updates += gradient_steps
+        self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
+        for name, value in asdict(losses).items():
+            self.logger.record(f"train/{name}", value)
 
     def reward_step(self) -> None:
         """One step of the reward network on the shared buffer."""
         config = self.config
         for group in self.reward_optimizer.param_groups:
             group["lr"] = self.lr_schedule(self._current_progress_remaining)
-        expert = torch.as_tensor(self._expert_states(config.batch_size))
-        expert_reward = self.reward_net(expert)
         if config.partition == "segment":
             states, log_prob = self.replay_buffer.sample_segments(config.batch_size, config.segment_length)
+            expert_reward = self.reward_net(expert := self._expert_states(states[:, 0]))
             policy = torch.as_tensor(states)
             policy_reward = self.reward_net(policy)
             log_partition, effective = log_partition_importance(
@@ -189,6 +200,7 @@ class ReplayIRL(SAC):
             policy, policy_reward = policy[:, 0], policy_reward[:, 0]
         else:
             states, log_prob = self.replay_buffer.sample_states(config.batch_size, config.absorbing_share)
+            expert_reward = self.reward_net(expert := self._expert_states(states))
             policy = torch.as_tensor(states)
             policy_reward = self.reward_net(policy)
             if config.partition == "importance":
@@ -209,15 +221,9 @@ class ReplayIRL(SAC):
         self.logger.record("reward/effective_sample_size", float(effective.detach()))
         self.logger.record("reward/gradient_penalty", float(penalty.detach()))
 
-    def _expert_states(self, count: int) -> NDArray[np.float32]:
-        absorbed = round(count * self.config.absorbing_share)
-        states = np.concatenate(
-            [
-                self.absorbed[self.random.integers(len(self.absorbed), size=absorbed)],
-                self.running[self.random.integers(len(self.running), size=count - absorbed)],
-            ]
-        )
-        return mirrored(self.features, states, self.random.random(count) < 0.5)
+    def _expert_states(self, policy: NDArray[np.float32]) -> torch.Tensor:
+        like = policy if self.config.matching == "density" else None
+        return torch.as_tensor(self.experts(len(policy), self.config.absorbing_share, self.random, like))
 
     def checkpoint(self) -> dict[str, Any]:
         """Everything that decides how the training goes on, between two steps of the scene.

@@ -13,28 +13,33 @@ replay buffer in one of three ways:
 The effective sample size, (sum w)^2 / sum w^2 with w the weights of the estimate, says how many samples it rests on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import torch
 from torch import Tensor, nn
+from torch.nn.utils.parametrizations import spectral_norm
+
+from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG
+from socialnav_mj.learning.config import TrainingConfig
 
 
 class RewardNet(nn.Module):
     """State-only reward r(s) in (-1, 1): ReLU layers and a tanh."""
 
-    def __init__(self, state_size: int, hidden: Sequence[int]) -> None:
+    def __init__(self, state_size: int, hidden: Sequence[int], *, spectral: bool = False) -> None:
         """Make the network.
 
         Args:
             state_size: Length of a state, with flags.
             hidden: Widths of the hidden layers.
+            spectral: Whether no linear layer may have a greater gain than 1.
         """
         super().__init__()
         layers: list[nn.Module] = []
         for width in hidden:
-            layers += [nn.Linear(state_size, width), nn.ReLU()]
+            layers += [_linear(state_size, width, spectral), nn.ReLU()]
             state_size = width
-        self.layers = nn.Sequential(*layers, nn.Linear(state_size, 1), nn.Tanh())
+        self.layers = nn.Sequential(*layers, _linear(state_size, 1, spectral), nn.Tanh())
 
     def forward(self, state: Tensor) -> Tensor:
         """Reward of states.
@@ -47,6 +52,11 @@ class RewardNet(nn.Module):
         """
         reward: Tensor = self.layers(state).squeeze(-1)
         return reward
+
+
+def _linear(size: int, width: int, spectral: bool) -> nn.Module:
+    layer = nn.Linear(size, width)
+    return spectral_norm(layer) if spectral else layer
 
 
 def log_partition_fused(policy_reward: Tensor, expert_reward: Tensor) -> tuple[Tensor, Tensor]:
@@ -109,3 +119,35 @@ def gradient_penalty(reward_net: nn.Module, expert: Tensor, policy: Tensor, mix:
     between = (mix * expert + (1.0 - mix) * policy).requires_grad_(True)
     (gradient,) = torch.autograd.grad(reward_net(between).sum(), between, create_graph=True)
     return (gradient**2).sum(dim=-1).mean()
+
+
+RewardOf = Callable[[Tensor, Tensor, Tensor], Tensor]
+"""From next states (n, size), whether the trip ended there (n, 1) and the task's own rewards (n, 1): rewards (n, 1)."""
+
+
+def reward_for(config: TrainingConfig, reward_net: RewardNet) -> RewardOf:
+    """The reward that a training asks for.
+
+    Args:
+        config: Its reward, and discount gamma: what an absorbing state gives at every step is worth r / (1 - gamma).
+        reward_net: Asked at the moment of sampling, for reward="learned".
+
+    Returns:
+        A function that the replay buffer calls.
+    """
+    for_ever = 1.0 / (1.0 - config.gamma)
+
+    def learned(next_state: Tensor, ended: Tensor, own: Tensor) -> Tensor:
+        with torch.no_grad():
+            reward = reward_net(next_state)[:, None]
+        return torch.where(ended > 0.0, reward * for_ever, reward)
+
+    def constant(next_state: Tensor, ended: Tensor, own: Tensor) -> Tensor:
+        at_goal, collided = next_state[:, GOAL_FLAG, None], next_state[:, COLLISION_FLAG, None]
+        absorbed = (config.goal_reward * at_goal + config.collision_reward * collided) * for_ever
+        return torch.where(ended > 0.0, absorbed, config.step_reward)
+
+    def task(next_state: Tensor, ended: Tensor, own: Tensor) -> Tensor:
+        return own
+
+    return {"learned": learned, "constant": constant, "task": task}[config.reward]

@@ -11,41 +11,24 @@ from numpy.typing import NDArray
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 
-from socialnav_mj.features import FeatureSet, mirror_state
-from socialnav_mj.learning.reward import RewardNet
+from socialnav_mj.features import FeatureSet
+from socialnav_mj.learning.mirror import Mirror
+from socialnav_mj.learning.reward import RewardOf
 
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 _OWN_ARRAYS = ("log_probs", "runs", "previous")
 
 
-def mirrored(features: FeatureSet, state: NDArray[Any], which: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """States of which some are mirrored.
-
-    Args:
-        features: Of the states.
-        state: Shape (n, size).
-        which: Shape (n,).
-
-    Returns:
-        Shape (n, size).
-    """
-    result = np.array(state, dtype=float)
-    result[which] = mirror_state(features, result[which])
-    return result.astype(np.float32)
-
-
 class SharedReplayBuffer(ReplayBuffer):
-    """Transitions of all agents in one row each; rewards are computed from the current reward network when sampled.
+    """Transitions of all agents in one row each; rewards are computed when it is sampled.
 
     Left and right are alike, so every sampled transition is mirrored with probability 1/2. Unlike its parent it keeps
     only transitions of slots that held an agent, whatever their number, and for each the behaviour policy's log density
     of the action and the row of the same run's transition before it.
     """
 
-    reward_net: RewardNet
+    reward_of: RewardOf
     """Set by the learner before the first sample."""
-    gamma: float
-    """An absorbing state is worth r / (1 - gamma)."""
 
     def __init__(
         self,
@@ -57,7 +40,6 @@ class SharedReplayBuffer(ReplayBuffer):
         optimize_memory_usage: bool = False,
         *,
         features: FeatureSet,
-        gamma: float,
         seed: int,
     ) -> None:
         """Make an empty buffer.
@@ -70,11 +52,10 @@ class SharedReplayBuffer(ReplayBuffer):
             n_envs: Number of slots.
             optimize_memory_usage: Not used.
             features: Of the observations.
-            gamma: Discount from one control step to the next.
             seed: Seed of the choice of transitions.
         """
         super().__init__(buffer_size, observation_space, action_space, device, n_envs=1)
-        self.features, self.gamma = features, gamma
+        self.mirror = Mirror(features)
         self.random = np.random.default_rng(seed)
         self.log_probs = np.zeros(self.buffer_size, dtype=np.float32)
         self.runs = np.full(self.buffer_size, -1, dtype=np.int64)
@@ -91,6 +72,7 @@ class SharedReplayBuffer(ReplayBuffer):
         done: NDArray[np.bool_],
         infos: list[dict[str, Any]],
         log_prob: NDArray[Any],
+        reward: NDArray[Any],
     ) -> None:
         """Add the transitions of the slots that held an agent.
 
@@ -101,13 +83,14 @@ class SharedReplayBuffer(ReplayBuffer):
             done: Shape (n_slots,).
             infos: With "active" and, where done, "TimeLimit.truncated".
             log_prob: Behaviour policy's log density of the actions, shape (n_slots,).
+            reward: The task's own, shape (n_slots,).
         """
         for slot in [i for i, info in enumerate(infos) if info["active"]]:
             row = self.pos
             self.observations[row, 0], self.next_observations[row, 0] = observation[slot], next_observation[slot]
             self.actions[row, 0], self.dones[row, 0] = action[slot], done[slot]
             self.timeouts[row, 0] = infos[slot].get("TimeLimit.truncated", False)
-            self.log_probs[row] = log_prob[slot]
+            self.log_probs[row], self.rewards[row, 0] = log_prob[slot], reward[slot]
             self.runs[row], self.previous[row] = self._slot_run[slot], self._slot_row[slot]
             self._slot_row[slot] = row
             if done[slot]:
@@ -118,7 +101,7 @@ class SharedReplayBuffer(ReplayBuffer):
                 self.full, self.pos = True, 0
 
     def sample(self, batch_size: int, env: Any = None) -> ReplayBufferSamples:
-        """Transitions for SAC, with rewards of the current reward network.
+        """Transitions for SAC, with the rewards that `reward_of` gives now.
 
         Args:
             batch_size: Number of transitions.
@@ -132,16 +115,14 @@ class SharedReplayBuffer(ReplayBuffer):
         turned = self.random.random(batch_size) < 0.5
         action = self.actions[rows, 0].copy()
         action[turned, 1] *= -1.0
-        next_state = self.to_torch(mirrored(self.features, self.next_observations[rows, 0], turned))
+        next_state = self.to_torch(self.mirror(self.next_observations[rows, 0], turned))
         terminal = self.to_torch(done)
-        with torch.no_grad():
-            reward = self.reward_net(next_state)[:, None]
         return ReplayBufferSamples(
-            self.to_torch(mirrored(self.features, self.observations[rows, 0], turned)),
+            self.to_torch(self.mirror(self.observations[rows, 0], turned)),
             self.to_torch(action),
             next_state,
             terminal,
-            torch.where(terminal > 0.0, reward / (1.0 - self.gamma), reward),
+            self.reward_of(next_state, terminal, self.to_torch(self.rewards[rows])),
         )
 
     def sample_states(self, batch_size: int, absorbing_share: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

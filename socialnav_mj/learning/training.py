@@ -1,8 +1,7 @@
 """A training from its configuration to its best policy: checkpoints, validation, resume."""
 
 import json
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -13,10 +12,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from socialnav_mj import metrics
 from socialnav_mj.config import Scenario
-from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
-from socialnav_mj.environment import build_environment
 from socialnav_mj.features import feature_set
 from socialnav_mj.files import write_json, write_whole, written_whole
 from socialnav_mj.learning.config import TrainingConfig
@@ -25,10 +21,10 @@ from socialnav_mj.learning.experts import Demonstrations, demonstrate
 from socialnav_mj.learning.policy_file import save_policy
 from socialnav_mj.learning.replay_irl import ReplayIRL
 from socialnav_mj.learning.shipping import BEST
+from socialnav_mj.learning.validation import is_kept, validate
 from socialnav_mj.provenance import package_versions, recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.window import window
-from socialnav_mj.rollout import rollout
 
 PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
 CHECKPOINT, HISTORY, CONFIG = "checkpoint.pt", "history.json", "config.json"
@@ -79,10 +75,11 @@ def train(
             demonstrate(
                 recording,
                 features,
-                Scenario(share=1.0),
+                Scenario(share=1.0, turn_limit=config.turn_limit),
                 minimum_displacement=config.expert_displacement,
                 contact_distance=config.expert_contact_distance,
                 clearance=config.expert_clearance,
+                companions_seen=config.companions_seen,
             )
             for recording in training
         ]
@@ -96,6 +93,7 @@ def train(
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
+        turn_limit=config.turn_limit,
         guide=config.guide,
         seed=config.seed,
     )
@@ -123,62 +121,14 @@ def _complete_card(
         return
     parts = {"in_sample": config.train_window, "validation": config.validation_window, "held_out": config.test_window}
     card["metrics"] = {
-        name: {"window": part, **validate(path, recordings, part=part, shares=config.validation_shares)}
+        name: {
+            "window": part,
+            **validate(path, recordings, part=part, shares=config.validation_shares, turn_limit=config.turn_limit),
+        }
         for name, part in parts.items()
     }
     card["history"] = history
     write_json(card_path, card)
-
-
-def validate(
-    policy_path: Path, recordings: list[Recording], *, part: tuple[float, float], shares: tuple[float, ...]
-) -> dict[str, float]:
-    """Success and intrusions of a policy in a part of recordings.
-
-    Args:
-        policy_path: Of the weights.
-        recordings: Whole recordings.
-        part: Window, as shares of their duration.
-        shares: Of replaced people; the scenes have draws 0, 1, 2, ...
-
-    Returns:
-        success, intrusion_share, time_under_way [s], n_agents.
-    """
-    success: list[float] = []
-    time: list[float] = []
-    intrusions = steps = 0.0
-    for recording in recordings:
-        for draw, share in enumerate(shares):
-            environment = build_environment(window(recording, *part), Scenario(share=share, seed=draw))
-            values = metrics.per_agent(rollout(environment, Policy(policy=str(policy_path))))
-            success += values["success"].astype(float).tolist()
-            time += values["time_under_way"].tolist()
-            intrusions += float(np.nansum(values["intimate_intrusions"]))
-            steps += float(np.nansum(values["active_steps"]))
-    return {
-        "success": float(np.mean(success)),
-        "intrusion_share": intrusions / max(steps, 1.0),
-        "time_under_way": float(np.nanmean(time)),
-        "n_agents": float(len(success)),
-    }
-
-
-def is_kept(entry: Mapping[str, Any], history: Sequence[Mapping[str, Any]], config: TrainingConfig) -> bool:
-    """Whether a checkpoint is to be kept instead of an earlier one.
-
-    Args:
-        entry: Its scene_steps, score, success and n_agents.
-        history: Of all earlier checkpoints.
-        config: Of the training.
-
-    Returns:
-        Whether its score is at most one standard error below the best; once a checkpoint is late, of the late ones.
-    """
-    late = config.kept_from * config.scene_steps
-    rivals = [e for e in history if (e["scene_steps"] >= late) == (entry["scene_steps"] >= late)]
-    best = max((*rivals, entry), key=lambda e: e["score"])
-    error = math.sqrt(best["success"] * (1.0 - best["success"]) / best["n_agents"])
-    return bool(entry["score"] >= best["score"] - error)
 
 
 def _claim(folder: Path, config: TrainingConfig) -> None:
@@ -255,7 +205,13 @@ class _Checkpoints(BaseCallback):
         }
         save_policy(model, latest, card)
         begin = perf_counter()
-        validation = validate(latest, self._recordings, part=config.validation_window, shares=config.validation_shares)
+        validation = validate(
+            latest,
+            self._recordings,
+            part=config.validation_window,
+            shares=config.validation_shares,
+            turn_limit=config.turn_limit,
+        )
         validation_seconds = perf_counter() - begin
         score = validation["success"] - config.intrusion_weight * validation["intrusion_share"]
         counts = np.bincount(self._outcomes, minlength=3) / max(len(self._outcomes), 1)
