@@ -14,6 +14,8 @@ from socialnav_mj.scene import REARM_TIME, agent_name
 from socialnav_mj.scene_index import index_scene
 from socialnav_mj.touch import Touch, TouchLog
 
+_SLEEP_NEVER = int(mujoco.mjtSleepPolicy.mjSLEEP_NEVER)
+_SLEEP_ALLOWED = int(mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED)
 _PARKING_DEPTH = 20.0
 """How far below the floor bodies wait that are not in the scene [m]."""
 
@@ -159,6 +161,9 @@ class Physics(MujocoPhysics):
         data.ctrl[self._index.ctrl[slot]] = 0.0
         model.body_gravcomp[self._index.agent_bodies[slot]] = 0.0 if present else 1.0
         self._set_contacts(self._index.agent_geoms[slot], present)
+        tree = self._index.agent_tree[slot]
+        # Only who is parked may sleep, since a sleeping robot would not listen to its command; its new place wakes it.
+        model.ptr.tree_sleep_policy[tree] = _SLEEP_NEVER if present else _SLEEP_ALLOWED
 
     # Pedestrians
 

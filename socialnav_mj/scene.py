@@ -64,6 +64,7 @@ def build_model(
     arena = mujoco.MjSpec.from_file(str(assets / "arena.xml"))
     arena.option.timestep = scenario.physics_timestep
     arena.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    arena.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     _aim_cameras(arena, low=low, high=high)
 
     for slot in range(n_agent_slots):
@@ -73,6 +74,7 @@ def build_model(
         robot.actuator("yaw").ctrlrange = [-scenario.max_yaw_rate, scenario.max_yaw_rate]
         for body in robot.bodies[1:]:
             body.gravcomp = 1.0
+        robot.body("robot").sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # the physics lets parked ones sleep
         arena.attach(robot, prefix=agent_name(slot), frame=_apart(arena, slot, row=0))
     for slot in range(n_pedestrian_slots):
         person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))

@@ -27,6 +27,8 @@ class SceneIndex:
     """Degrees of freedom of each robot."""
     agent_joints: tuple[IntArray, ...]
     """Joints of each robot, the free one included."""
+    agent_tree: IntArray
+    """(n,) kinematic tree of each robot."""
     pedestrian_geom: IntArray
     """(m,) collider of each pedestrian; mocap bodies have the slots' order."""
     owner: IntArray
@@ -76,6 +78,7 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
         qpos=np.array([model.joint(name + "root").qposadr[0] for name in agents], dtype=np.int64),
         qvel=np.array([model.joint(name + "root").dofadr[0] for name in agents], dtype=np.int64),
         ctrl=np.array([[model.actuator(name + what).id for what in ("forward", "yaw")] for name in agents]),
+        agent_tree=np.asarray(model.body_treeid)[robots].astype(np.int64),
         agent_bodies=belonging(np.arange(model.nbody)),
         agent_geoms=belonging(model.geom_bodyid),
         agent_dofs=belonging(model.dof_bodyid),

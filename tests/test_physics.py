@@ -245,6 +245,35 @@ def test_parked_robot_is_as_new_when_it_is_placed_again() -> None:
 # Impulse
 
 
+def test_parked_robots_sleep_and_the_others_stay_awake_and_listen() -> None:
+    """A robot that stands still for 5 s obeys its command at once, and a walker's touch; a parked one costs nothing."""
+    physics = physics_of(2)
+    physics.park_agent(1)
+    awake = physics.data.ptr.tree_awake
+    trees = physics.model.ptr.body_treeid[[physics.model.body(f"agent_00{slot}/robot").id for slot in (0, 1)]]
+    physics.step(500)
+    assert awake[trees].tolist() == [1, 0]
+    physics.set_twist(np.array([[1.0, 0.0], [0.0, 0.0]]))
+    physics.step()
+    assert physics.agent_velocity()[0, 0] > 0.01
+    physics.place_agent(1, np.array([0.0, 3.0]), 0.0)
+    physics.set_twist(np.array([[0.0, 0.0], [1.0, 0.0]]))
+    physics.step(200)
+    assert awake[trees].tolist() == [1, 1]
+    assert physics.agent_velocity()[1, 0] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_sleep_changes_no_bit_of_an_episode(share: float) -> None:
+    hashes = []
+    for is_on in (True, False):
+        environment = tasks.load("scenario_1", task_kwargs={"share": share, "dataset": TINY})
+        if not is_on:
+            environment.physics.model.ptr.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+        hashes.append(rollout(environment, GoStraight()).metadata["state_hash"])
+    assert hashes[0] == hashes[1]
+
+
 def test_impulse_is_the_momentum_that_a_walker_gives_to_a_free_robot() -> None:
     physics = physics_of(slippery=True)
     positions = np.stack([1.0 - 1.3 * TIMESTEP * np.arange(200), np.zeros(200)], axis=-1)
