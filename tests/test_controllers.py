@@ -24,7 +24,7 @@ from socialnav_mj.controllers.potential_field import (
 from socialnav_mj.geometry import twist_of_wheel_speed
 
 LIMITS = Limits.of(Scenario())
-BOTH = [PotentialField(), PotentialField(attraction_limit=None), GoStraight()]
+BOTH = [PotentialFieldCapped(), PotentialField(), GoStraight()]
 IDS = ["capped", "printed", "straight"]
 
 
@@ -140,16 +140,16 @@ def test_speed_and_turn_are_equations_7_and_8_with_the_angle_positive_and_away_f
 def test_potential_field_adds_up_pedestrians_and_agents_by_hand():
     """Pull 1 ahead, damping 0.5 * 0.4; a person 1 m left pushes 0.5 right, an agent 1 m ahead pushes 0.5 back."""
     seen = observation((9.0, 0.0), 0.4, pedestrians=[(0.0, 1.0)], agents=[(1.0, 0.0)])
-    np.testing.assert_allclose(PotentialField().force(seen)[0], [1.0 - 0.2 - 0.5, -0.5], rtol=1e-12)
-    np.testing.assert_allclose(PotentialField(attraction_limit=None).force(seen)[0], [9.0 - 0.2 - 0.5, -0.5])
+    np.testing.assert_allclose(PotentialFieldCapped().force(seen)[0], [1.0 - 0.2 - 0.5, -0.5], rtol=1e-12)
+    np.testing.assert_allclose(PotentialField().force(seen)[0], [9.0 - 0.2 - 0.5, -0.5])
     np.testing.assert_array_equal(PotentialField().force(seen)[1], 0.0)
 
 
 def test_potential_field_names_the_gains_of_its_docstrings():
-    """The docstrings say k_p 1, k_v 0.5, eta 2, rho_0 2 m, and a pull of at most 1."""
-    field = PotentialField()
-    gains = (field.position_gain, field.velocity_gain, field.repulsion_gain, field.influence_distance)
-    assert gains == (1.0, 0.5, 2.0, 2.0) and field.attraction_limit == 1.0
+    """The docstrings say k_p 1, k_v 0.5, eta 2, rho_0 2 m for both, and a pull of at most 1 for the capped one."""
+    for field, limit in ((PotentialField(), None), (PotentialFieldCapped(), 1.0)):
+        gains = (field.position_gain, field.velocity_gain, field.repulsion_gain, field.influence_distance)
+        assert gains == (1.0, 0.5, 2.0, 2.0) and field.attraction_limit == limit
 
 
 @pytest.mark.parametrize(

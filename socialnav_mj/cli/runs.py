@@ -36,7 +36,7 @@ class Evaluate:
     scenarios: Scenarios = (1, 2, 3, 4)
     """Scenarios that replace 10, 30, 70, 90 % of the people."""
     controllers: tuple[str, ...] = ("potential_field", "go_straight")
-    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(attraction_limit=None)'.
+    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(repulsion_gain=3.0)'.
     replay_irl and hybrid act with the shipped policy that learned from the recording, if there is one, else with
     plaza's."""
     draws: int = 3

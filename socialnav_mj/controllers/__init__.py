@@ -3,7 +3,7 @@
 from socialnav_mj.controllers.base import Controller, Limits, Observation, TwistController
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
-from socialnav_mj.controllers.potential_field import PotentialField
+from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.registry import BUILT_IN, available, class_path, make_controller
 from socialnav_mj.controllers.replay_irl import ReplayIRL
 from socialnav_mj.controllers.specs import controller_config, controller_of, spec_of, with_policy_of
@@ -16,6 +16,7 @@ __all__ = [
     "Limits",
     "Observation",
     "PotentialField",
+    "PotentialFieldCapped",
     "ReplayIRL",
     "TwistController",
     "available",

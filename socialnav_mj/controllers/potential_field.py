@@ -94,10 +94,9 @@ def _require_number(name: str, given: object, *, zero_allowed: bool, or_else: st
 class PotentialField(TwistController):
     """Attraction to the goal and repulsion from everybody near, pedestrians and agents alike.
 
-    The paper names no gains. With eq 3 as printed the attraction grows with the distance to the goal, 10 N at 10 m, and
-    swamps the repulsion; with the pull capped at 1 it is clearly better, so that is the default, and
-    `attraction_limit=None` gives the equations as printed. The paper names no unit of time for the change of heading:
-    it is made in one control step as far as the yaw rate allows.
+    Eq 3 as printed: the pull grows with the distance to the goal, 10 N at 10 m, and swamps the repulsion. The paper
+    names no gains; docs/controllers.md has a sweep. It names no unit of time for the change of heading either: it is
+    made in one control step as far as the yaw rate allows.
     """
 
     position_gain: float = 1.0
@@ -108,7 +107,7 @@ class PotentialField(TwistController):
     """eta >= 0: strength of the pushes."""
     influence_distance: float = 2.0
     """rho_0 > 0: nobody farther away pushes [m]."""
-    attraction_limit: float | None = 1.0
+    attraction_limit: float | None = None
     """Largest size of the pull towards the goal; None for eq 3 as printed."""
     name: str = "potential_field"
 
@@ -157,3 +156,15 @@ class PotentialField(TwistController):
         """
         speed, turn = speed_and_turn(self.force(observation))
         return np.stack([speed, turn / self.limits.control_timestep], axis=1)
+
+
+@dataclass(kw_only=True)
+class PotentialFieldCapped(PotentialField):
+    """The potential field with a pull of at most 1, however far the goal: ours, and clearly stronger than the paper's.
+
+    The authors' research code caps attraction and repulsion alike; the paper does not say so.
+    """
+
+    attraction_limit: float | None = 1.0
+    """Largest size of the pull towards the goal; None for eq 3 as printed."""
+    name: str = "potential_field_capped"

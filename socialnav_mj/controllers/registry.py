@@ -11,13 +11,14 @@ from typing import Any
 from socialnav_mj.controllers.base import IS_CONTROLLER, Controller
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
-from socialnav_mj.controllers.potential_field import PotentialField
+from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
 
 ENTRY_POINT_GROUP = "socialnav_mj.controllers"
 
 BUILT_IN: dict[str, Callable[..., Controller]] = {
     "potential_field": PotentialField,
+    "potential_field_capped": PotentialFieldCapped,
     "replay_irl": ReplayIRL,
     "hybrid": Hybrid,
     "go_straight": GoStraight,
@@ -39,7 +40,7 @@ def make_controller(spec: str) -> Controller:
 
     Args:
         spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class";
-            keyword arguments of literals may follow, as in "potential_field(attraction_limit=None)". With them a
+            keyword arguments of literals may follow, as in "potential_field(repulsion_gain=3.0)". With them a
             dataclass with a field `name` is named by the whole spec, so that two configurations can stand in one
             table.
 

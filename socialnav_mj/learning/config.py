@@ -61,7 +61,7 @@ class TrainingConfig:
     power, so their mean age is a tenth of t (polynomial-decay averaging, Shamir and Zhang, ICML 2013)."""
     guided_scene_steps: int = 2500
     """Control steps before any update, in which the guide acts instead of the actor."""
-    guide: str = "potential_field"
+    guide: str = "potential_field_capped"
     """Controller that fills the buffer at first; from uniformly random actions SAC learned to freeze before people."""
     guide_noise: float = 0.4
     """Standard deviation of the normal noise on the guide's actions, in [-1, 1] units."""
