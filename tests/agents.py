@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 
 from socialnav_mj.report.agents import SCHEMA
-from socialnav_mj.studies.panel import HUMAN, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry
+from socialnav_mj.studies.panel import CAPPED, HUMAN, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry
 
 SHARES = {"scenario_1": 0.1, "scenario_2": 0.3, "scenario_3": 0.7, "scenario_4": 0.9}
 
@@ -16,6 +16,7 @@ def roster_of(trainings: Sequence[int]) -> tuple[Entry, ...]:
     """Controllers of an experiment, named after their method and training."""
     return (
         Entry(controller="pf", method=POTENTIAL_FIELD),
+        Entry(controller="cap", method=CAPPED),
         *(Entry(controller=f"irl{k}", method=REPLAY_IRL, training_seed=k) for k in trainings),
         *(Entry(controller=f"mix{k}", method=MIXED, training_seed=k) for k in trainings),
         Entry(controller=HUMAN, method=HUMAN),
@@ -50,6 +51,7 @@ def table_of(rows: Sequence[Mapping[str, Any]]) -> pa.Table:
 
 METHOD_VALUES: dict[str, dict[str, list[float]]] = {
     "pf": {"success": [0.5, 0.6, 0.8, 0.9], "speed": [0.9] * 4, "path": [1.0] * 4, "steps": [60.0, 50.0, 30.0, 20.0]},
+    "cap": {"success": [0.5, 0.6, 0.8, 0.9], "speed": [0.8] * 4, "path": [1.1] * 4, "steps": [50.0, 40.0, 25.0, 15.0]},
     "irl": {"success": [0.6, 0.7, 0.7, 0.8], "speed": [0.7] * 4, "path": [1.3] * 4, "steps": [30.0, 25.0, 15.0, 10.0]},
     "mix": {
         "success": [0.7, 0.8, 0.9, 0.95],

@@ -44,6 +44,7 @@ def write_policy(path: Path, *, tensors=None, features: str = "continuous", seed
         "features": features,
         "seed": seed,
         "datasets": ["made"],
+        "turn_limit": "per_step",
         "train_window": [0.0, 0.6],
         "validation_window": [0.6, 0.7],
     }

@@ -17,6 +17,7 @@ from socialnav_mj.controllers.potential_field import (
     MINIMUM_DISTANCE,
     MINIMUM_TURN,
     PotentialField,
+    PotentialFieldCapped,
     attractive_force,
     repulsive_force,
     speed_and_turn,

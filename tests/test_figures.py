@@ -51,12 +51,18 @@ def grey(colour):
 
 
 def test_levels_are_the_means_of_the_table_within_the_interval(table):
-    for method, short in (("potential_field", "pf"), ("replay_irl", "irl"), ("mixed", "mix"), ("human", "human")):
+    for method, short in (
+        ("potential_field", "pf"),
+        ("potential_field_capped", "cap"),
+        ("replay_irl", "irl"),
+        ("mixed", "mix"),
+        ("human", "human"),
+    ):
         for place, scenario in enumerate(table.scenarios):
             level = table.find(scenario, method, "average_speed")
             assert level.interval.mean == pytest.approx(METHOD_VALUES[short]["speed"][place], rel=0.05)
             assert level.interval.low < level.interval.mean < level.interval.high
-    assert len(table.rows) == 4 * (2 + 2 * 4) * len(LEVEL_MEASURES)
+    assert len(table.rows) == 4 * (3 + 2 * 4) * len(LEVEL_MEASURES)
     each = [table.find("scenario_1", MIXED, "success", k).interval.mean for k in SEEDS]
     assert np.mean(each) == pytest.approx(table.find("scenario_1", MIXED, "success").interval.mean)
 
@@ -119,8 +125,8 @@ def test_methods_differ_in_brightness_and_hatch_or_marker():
     looks = [LOOKS[method] for method in METHODS]
     brightness = sorted(grey(look.colour) for look in looks)
     assert min(np.diff(brightness)) > 0.1
-    assert len({look.hatch for look in looks[:3]}) == 3
-    assert len({look.marker for look in looks}) == len({look.line for look in looks}) == 4
+    assert len({look.hatch for look in looks[:4]}) == 4
+    assert len({look.marker for look in looks}) == len({look.line for look in looks}) == 5
 
 
 def test_sweep_runs_from_the_potential_field_to_the_learned_policy(table, tmp_path):

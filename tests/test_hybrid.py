@@ -220,9 +220,9 @@ POLICY = "replay_irl(policy='students003_continuous_seed0')"
     [
         "replay_irl",
         POLICY,
-        "potential_field(attraction_limit=None)",
-        "potential_field( attraction_limit = 1.0 )",  # a default that is given, and not as it would be written
-        "potential_field(attraction_limit=None, name='PF')",
+        "potential_field(attraction_limit=2.0)",
+        "potential_field_capped( attraction_limit = 1.0 )",  # a default that is given, and not as it would be written
+        "potential_field(attraction_limit=2.0, name='PF')",
         f"{__name__}:Own(knob=3)",
         f"hybrid(near={POLICY!r}, switch_distance=1.5)",
     ],

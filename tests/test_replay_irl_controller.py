@@ -60,9 +60,9 @@ OWN = "replay_irl(policy='students003_continuous_seed0')"
         ("hybrid", f"hybrid(near={OWN!r})"),
         ("hybrid(switch_distance=1.0)", f"hybrid(switch_distance=1.0, near={OWN!r})"),
         ("hybrid(near='go_straight', far='replay_irl')", f"hybrid(near='go_straight', far={OWN!r})"),
-        ("replay_irl(policy='students003_risk_seed0')", "replay_irl(policy='students003_risk_seed0')"),
+        ("replay_irl(policy='students003_continuous_seed0')", "replay_irl(policy='students003_continuous_seed0')"),
         ("hybrid(near='go_straight')", "hybrid(near='go_straight')"),
-        ("potential_field(attraction_limit=None)", "potential_field(attraction_limit=None)"),
+        ("potential_field(attraction_limit=2.0)", "potential_field(attraction_limit=2.0)"),
     ],
 )
 def test_learned_controllers_act_with_the_policy_of_the_recording(spec, expected):
@@ -196,7 +196,13 @@ def test_weights_that_are_no_networks_are_refused_and_the_file_and_the_tensor_na
 
 
 NESTED = "[" * 100_000 + "]" * 100_000
-GIVEN = {"seed": 0, "datasets": ["made"], "train_window": [0.0, 0.6], "validation_window": [0.6, 0.7]}
+GIVEN = {
+    "seed": 0,
+    "datasets": ["made"],
+    "turn_limit": "per_step",
+    "train_window": [0.0, 0.6],
+    "validation_window": [0.6, 0.7],
+}
 
 
 @pytest.mark.parametrize(

@@ -31,9 +31,20 @@ def policies(tmp_path_factory):
     return tuple(write_toy(folder, f"p{seed}", seed=seed) for seed in (1, 0))
 
 
+@pytest.fixture(scope="module")
+def of_both_limits(policies, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("policies")
+    return *policies, write_toy(folder, "slow", seed=5, turn_limit="per_second")
+
+
 @pytest.fixture
 def experiment(policies):
     return Experiment(dataset=TINY, policies=policies, scenarios=("scenario_1", "scenario_4"), draws=2)
+
+
+@pytest.fixture
+def whole(experiment, of_both_limits):
+    return replace(experiment, policies=of_both_limits, variants=True)
 
 
 @pytest.fixture(autouse=True)
@@ -46,18 +57,19 @@ def test_plan_runs_every_method_of_every_training_in_the_default_setting(experim
     (run,) = experiment.runs()
     methods = [(entry.method, entry.training_seed) for entry in run.roster]
     learned = [(method, seed) for method in ("replay_irl", "mixed") for seed in (0, 1)]
-    assert methods == [("potential_field", None), *learned, ("human", None)]
-    assert len(experiment.jobs()) == 2 * 2 * 6
+    fields = [("potential_field", None), ("potential_field_capped", None)]
+    assert methods == [*fields, *learned, ("human", None)]
+    assert len(experiment.jobs()) == 2 * 2 * 7
 
 
-def test_plan_names_controllers_as_the_tables_do(experiment):
-    for run in replace(experiment, variants=True).runs():
+def test_plan_names_controllers_as_the_tables_do(whole):
+    for run in whole.runs():
         specs = [entry.controller for entry in run.roster if entry.method != "human"]
         assert [make_controller(spec).name for spec in specs] == specs == list(run.evaluation.controllers)
 
 
-def test_variants_change_what_they_say_and_nothing_else(experiment):
-    runs = {run.name: run for run in replace(experiment, variants=True).runs()}
+def test_variants_change_what_they_say_and_nothing_else(whole):
+    runs = {run.name: run for run in whole.runs()}
     assert list(runs) == [variant.name for variant in VARIANTS] + ["switch_sweep"]
     assert runs["radii_0.25"].evaluation.task_kwargs == {"pedestrian_radius": 0.08}
     assert runs["radii_0.40"].evaluation.task_kwargs == {"pedestrian_radius": 0.23}
@@ -65,16 +77,21 @@ def test_variants_change_what_they_say_and_nothing_else(experiment):
     assert runs["retire"].evaluation.task_kwargs == {"on_collision": "retire"}
     anyone = [make_controller(c) for c in runs["switch_anyone"].evaluation.controllers]
     assert [(c.who, c.switch_distance) for c in anyone] == [("anyone", 2.0)] * 2
-    printed = [make_controller(c) for c in runs["pf_as_printed"].evaluation.controllers]
-    assert printed[0].attraction_limit is None
-    assert [c.far.attraction_limit for c in printed[1:]] == [None, None]
+    capped = [make_controller(c) for c in runs["capped"].evaluation.controllers]
+    assert [c.far.name for c in capped] == ["potential_field_capped"] * 2
+    default = [make_controller(c) for c in runs["default"].evaluation.controllers]
+    assert [c.far.name for c in default[-2:]] == ["potential_field"] * 2
+    slow = [(e.method, e.training_seed) for e in runs["turn_per_second"].roster if e.training_seed is not None]
+    assert slow == [("replay_irl", 5), ("mixed", 5)]
     swept = [make_controller(c).switch_distance for c in runs["switch_sweep"].evaluation.controllers]
     assert swept == [d for d in SWEEP for _ in range(2)] and 2.0 not in SWEEP
 
 
-def test_variants_may_have_fewer_draws_than_the_default_setting(experiment):
-    wide = replace(experiment, variants=True, draws=3, variant_draws=2, seed=5)
-    assert [run.evaluation.draws for run in wide.runs()] == [3] + [2] * len(VARIANTS)
+def test_variants_may_have_fewer_draws_and_trainings_than_the_default_setting(whole):
+    wide = replace(whole, draws=3, variant_draws=2, variant_trainings=1, seed=5)
+    assert [run.evaluation.draws for run in wide.runs()] == [3, 3, 3, 2, 2, 2, 2, 2]
+    trainings = [sorted({e.training_seed for e in run.roster} - {None}) for run in wide.runs()]
+    assert trainings == [[0, 1], [0, 1], [5], [0], [0], [0], [0], [0]]
     table = experiment_table(n_draws=9, n_agents=2, trainings=(0, 1))
     spec = next(e.controller for e in wide.roster(DEFAULT) if e.method == "potential_field")
     table = table.set_column(
@@ -86,6 +103,8 @@ def test_variants_may_have_fewer_draws_than_the_default_setting(experiment):
     assert max(agents_of(wide, variant, results)["draw"].to_pylist()) == 6
     with pytest.raises(ValueError, match="variant_draws = 4 is not allowed; allowed: 1 to draws = 3"):
         replace(wide, variant_draws=4)
+    with pytest.raises(ValueError, match="variant_trainings = 0 is not allowed"):
+        replace(wide, variant_trainings=0)
 
 
 def test_variant_takes_unchanged_methods_from_the_default_setting(experiment):
@@ -95,6 +114,7 @@ def test_variant_takes_unchanged_methods_from_the_default_setting(experiment):
     known = {
         "irl0": "replay_irl0",
         "irl1": "replay_irl1",
+        "cap": "potential_field_cappedNone",
         "mix0": "mixed0",
         "mix1": "mixed1",
         "pf": "potential_fieldNone",
@@ -108,7 +128,7 @@ def test_variant_takes_unchanged_methods_from_the_default_setting(experiment):
     }
     results[variant.name] = replace(results[variant.name], agents=table.slice(0, 0))
     taken = set(agents_of(experiment, variant, results)["controller"].to_pylist())
-    assert taken == {roster["potential_fieldNone"], roster["replay_irl0"], roster["replay_irl1"]}
+    assert taken == {"potential_field", "potential_field_capped", roster["replay_irl0"], roster["replay_irl1"]}
     assert agents_of(experiment, DEFAULT, results).num_rows == table.num_rows
 
 
@@ -117,6 +137,8 @@ def test_experiment_refuses_no_policy_two_of_a_seed_and_unknown_recordings(polic
         Experiment(dataset=TINY, policies=())
     with pytest.raises(ValueError, match=r"training seeds \[1, 1\]; allowed: one of each"):
         Experiment(dataset=TINY, policies=(policies[0], policies[0]))
+    with pytest.raises(ValueError, match="there is none for: turn limit per second"):
+        Experiment(dataset=TINY, policies=policies, variants=True)
     with pytest.raises(ValueError, match="no shipped policy was trained on 'nowhere' with 'continuous' features"):
         shipped_for("nowhere")
 
@@ -124,11 +146,12 @@ def test_experiment_refuses_no_policy_two_of_a_seed_and_unknown_recordings(polic
 def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsys):
     out, public = tmp_path / "out", tmp_path / "results"
     command = ["reproduce", "--dataset", TINY, "--policies", *policies, "--scenarios", "1", "4", "--draws", "1"]
+    command += ["--seed", "0"]
     command += ["--jobs", "1", "--out", str(out), "--publish", str(public)]
     main(command)
     assert "claims:" in capsys.readouterr().out.replace("\n", " ")
     episodes = sorted((out / "runs" / "default" / "episodes").glob("*.npz"))
-    assert len(episodes) == 2 * 6
+    assert len(episodes) == 2 * 7
     before = {path: path.stat().st_mtime_ns for path in episodes}
     tables = {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
     episodes[3].unlink()
@@ -152,8 +175,8 @@ def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsy
     assert len(linked) >= 7 and all((public / name).is_file() for name in linked)
 
 
-def test_variants_and_sweep_are_run_and_judged(experiment, tmp_path):
-    experiment = replace(experiment, variants=True, scenarios=("scenario_4",), draws=1)
+def test_variants_and_sweep_are_run_and_judged(whole, tmp_path):
+    experiment = replace(whole, scenarios=("scenario_4",), draws=1)
     done = list(reproduce(experiment, tmp_path, command="made so", n_jobs=1))
     assert len(done) == len(experiment.jobs()) and all(d.error is None for d in done)
     page = write_outputs(experiment, tmp_path, command="made so", n_jobs=1)
@@ -178,15 +201,15 @@ def test_fewer_draws_than_the_folder_holds_are_read_alone(experiment, tmp_path):
     list(reproduce(experiment, tmp_path, n_jobs=1))
     for draws in (2, 1):
         results = read_runs(replace(experiment, draws=draws), tmp_path, n_jobs=1)["default"]
-        assert len(results.sources) == 6 * draws and {s.draw for s in results.sources} == {*range(draws)}
+        assert len(results.sources) == 7 * draws and {s.draw for s in results.sources} == {*range(draws)}
 
 
-def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(experiment, tmp_path):
+def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(experiment, of_both_limits, tmp_path):
     experiment = replace(experiment, scenarios=("scenario_1",), draws=1)
     list(reproduce(experiment, tmp_path, n_jobs=1))
     (run_folder(tmp_path, "default")).rename(tmp_path / "runs" / "radii_0.25")
     with pytest.raises(EpisodeError, match=r"pedestrian_radius = 0.15, but 0.08 is asked for"):
-        reproduce(replace(experiment, variants=True), tmp_path, n_jobs=1)
+        reproduce(replace(experiment, policies=of_both_limits, variants=True), tmp_path, n_jobs=1)
     assert not run_folder(tmp_path, "default").joinpath("episodes").exists()
 
 

@@ -44,7 +44,13 @@ def test_texts_use_the_glossarys_words(path):
 
 
 def test_methods_and_comparisons_are_named_by_the_glossarys_words():
-    assert {LOOKS[method].label for method in METHODS} == {"potential field", "ReplayIRL", "hybrid", "human"}
+    assert {LOOKS[method].label for method in METHODS} == {
+        "potential field",
+        "capped field",
+        "ReplayIRL",
+        "hybrid",
+        "human",
+    }
     for claim in CLAIMS:
         uses_it = any(term.method == MIXED for part in claim.parts for term in part.terms)
         for text in (claim.test, *(part.label for part in claim.parts)):

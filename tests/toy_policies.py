@@ -20,6 +20,7 @@ def write_toy(
     reward: Callable[[Array], None] | None = None,
     datasets: Sequence[str] = ("tiny",),
     train_end: float = 0.6,
+    turn_limit: str = "per_step",
 ) -> str:
     """A policy that turns to its goal at speed, a little differently for each seed.
 
@@ -30,6 +31,7 @@ def write_toy(
         reward: Fills the reward network's weights, shape (1, size + 2), in place; zeros by default.
         datasets: In its card.
         train_end: End of the part that it learned from, in its card; a tenth for validation follows.
+        turn_limit: In its card.
 
     Returns:
         Path of the policy.
@@ -51,6 +53,7 @@ def write_toy(
         "features": "continuous",
         "seed": seed,
         "datasets": list(datasets),
+        "turn_limit": turn_limit,
         "train_window": [0.0, train_end],
         "validation_window": [train_end, train_end + 0.1],
         "intrusion_weight": 0.5,

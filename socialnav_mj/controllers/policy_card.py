@@ -5,7 +5,9 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 from reprlib import repr as short
-from typing import Any
+from typing import Any, get_args
+
+from socialnav_mj.config import TurnLimit
 
 
 class PolicyError(ValueError):
@@ -26,6 +28,7 @@ _REQUIRED: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "config.features": ("a string", lambda v: isinstance(v, str)),
     "config.seed": ("an integer >= 0", lambda v: type(v) is int and v >= 0),
     "config.datasets": ("a list of one or more strings", _is_names),
+    "config.turn_limit": ("per_step or per_second", lambda v: v in get_args(TurnLimit)),
     "config.train_window": ("a list of two shares in [0, 1]", _is_share_pair),
     "config.validation_window": ("a list of two shares in [0, 1]", _is_share_pair),
 }

@@ -40,6 +40,11 @@ class TrainedPolicy:
         """Seed that the card says the training had."""
         return int(self.card["config"]["seed"])
 
+    @property
+    def turn_limit(self) -> str:
+        """Reading of the turn limit that the card says the training had."""
+        return str(self.card["config"]["turn_limit"])
+
     def action(self, state: Array) -> Array:
         """Deterministic action of the actor: tanh of the mean.
 

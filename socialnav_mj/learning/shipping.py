@@ -9,6 +9,7 @@ import numpy as np
 from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_json, write_whole
+from socialnav_mj.learning.config import TrainingConfig
 
 MEASURES = ("success", "intrusion_share", "time_under_way")
 BEST = "best.safetensors"
@@ -17,8 +18,9 @@ BEST = "best.safetensors"
 def ship(folders: Sequence[Path], target: Path) -> list[Path]:
     """Put the best policies of finished trainings among others, as DATASETS_FEATURES_seedSEED.
 
-    Trainings that differ in nothing but their seed are a family. Every card of a family gets its `seed_spread`: mean,
-    standard deviation, least and greatest of its members' metrics.
+    A turn limit that is not the default one stands before the seed. Trainings that differ in nothing but their seed are
+    a family. Every card of a family gets its `seed_spread`: mean, standard deviation, least and greatest of its
+    members' metrics.
 
     Args:
         folders: Of `socialnav_mj.learning.training.train`.
@@ -41,7 +43,8 @@ def ship(folders: Sequence[Path], target: Path) -> list[Path]:
             raise PolicyError(f"{folder}: the training is not finished; run it to its end first")
         config = card["config"]
         names = "_".join(Path(name).stem for name in config["datasets"])
-        name = f"{names}_{config['features']}_seed{config['seed']}"
+        limit = "" if config["turn_limit"] == TrainingConfig.turn_limit else f"_{config['turn_limit']}"
+        name = f"{names}_{config['features']}{limit}_seed{config['seed']}"
         found[name] = (card, (folder / BEST).read_bytes())
         shipped.append(name)
     families: dict[str, list[str]] = {}

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from socialnav_mj.report.paired import HUMAN
-from socialnav_mj.studies.panel import MIXED, POTENTIAL_FIELD, REPLAY_IRL
+from socialnav_mj.studies.panel import CAPPED, MIXED, POTENTIAL_FIELD, REPLAY_IRL
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,12 +15,15 @@ class Look:
     colour: str
     hatch: str
     marker: str
-    line: Literal["-", "--", "-.", ":"]
+    line: Literal["-", "--", "-.", ":"] | tuple[int, tuple[int, ...]]
+    """As matplotlib's linestyle."""
 
 
-# P. Tol's "high-contrast" scheme: distinct for every kind of colour vision, and light, middle, dark in greyscale.
+# P. Tol's "high-contrast" scheme: distinct for every kind of colour vision, and light, middle, dark in greyscale. The
+# capped field has a lighter shade of the paper's.
 LOOKS: dict[str, Look] = {
     POTENTIAL_FIELD: Look(label="potential field", colour="#DDAA33", hatch="", marker="o", line="-"),
+    CAPPED: Look(label="capped field", colour="#EECC66", hatch="\\\\\\\\", marker="v", line=(0, (5, 1, 1, 1, 1, 1))),
     REPLAY_IRL: Look(label="ReplayIRL", colour="#004488", hatch="////", marker="s", line="--"),
     MIXED: Look(label="hybrid", colour="#BB5566", hatch="....", marker="D", line="-."),
     HUMAN: Look(label="human", colour="#000000", hatch="", marker="^", line=":"),

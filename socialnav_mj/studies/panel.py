@@ -12,8 +12,9 @@ from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, WEIGHTS, Columns, draw_means
 from socialnav_mj.report.paired import HUMAN
 
-POTENTIAL_FIELD, REPLAY_IRL, MIXED = "potential_field", "replay_irl", "mixed"
-METHODS = (POTENTIAL_FIELD, REPLAY_IRL, MIXED, HUMAN)
+POTENTIAL_FIELD, CAPPED, REPLAY_IRL, MIXED = "potential_field", "potential_field_capped", "replay_irl", "mixed"
+ROBOTS = (POTENTIAL_FIELD, CAPPED, REPLAY_IRL, MIXED)
+METHODS = (*ROBOTS, HUMAN)
 """What is compared; the learned ones once for each training."""
 
 COMMON = "_common"

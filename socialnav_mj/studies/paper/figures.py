@@ -15,9 +15,8 @@ from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.style import OUTLINE, new_figure, save, style
 from socialnav_mj.studies.levels import Level, LevelTable
 from socialnav_mj.studies.looks import LINES, LOOKS, MARKERS, SCENARIO_TITLES, SHADES, short_title
-from socialnav_mj.studies.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD, REPLAY_IRL
+from socialnav_mj.studies.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD, REPLAY_IRL, ROBOTS
 
-ROBOTS = (POTENTIAL_FIELD, REPLAY_IRL, MIXED)
 DOT: dict[str, Any] = {
     "linestyle": "",
     "marker": "o",
@@ -182,7 +181,7 @@ def _bar(axes: Axes, x: int, table: LevelTable, scenario: str, method: str, meas
     for k, training in enumerate(trainings):
         single = table.find(scenario, method, measure, training)
         if single is not None:
-            place = x + 0.1 + 0.1 * k
+            place = x + 0.05 + 0.3 * (k + 0.5) / len(trainings)
             axes.plot(place, single.interval.mean, zorder=6, **DOT)
 
 
@@ -202,7 +201,7 @@ def _lines(table: LevelTable, drawing: Drawing) -> Figure:
     grid = figure.subplots(1, len(drawing.rows), sharey=True, squeeze=False)[0]
     for axes, row in zip(grid, drawing.rows, strict=True):
         for k, method in enumerate(METHODS):
-            found = [(x + 0.07 * (k - 1.5), table.find(s, method, row.measure)) for x, s in enumerate(scenarios)]
+            found = [(x + 0.07 * (k - 2.0), table.find(s, method, row.measure)) for x, s in enumerate(scenarios)]
             points = [(x, level) for x, level in found if level is not None]
             look = LOOKS[method]
             _error_bars(axes, points, color=look.colour, marker=look.marker, linestyle=look.line)
@@ -218,7 +217,7 @@ def _lines(table: LevelTable, drawing: Drawing) -> Figure:
     return figure
 
 
-def _error_bars(axes: Axes, points: Sequence[tuple[float, Level]], **look: str) -> None:
+def _error_bars(axes: Axes, points: Sequence[tuple[float, Level]], **look: Any) -> None:
     points = [(x, level) for x, level in points if np.isfinite(level.interval.mean)]
     if not points:
         return
@@ -230,7 +229,7 @@ def _error_bars(axes: Axes, points: Sequence[tuple[float, Level]], **look: str) 
         markeredgecolor="black",
         markeredgewidth=0.5,
         elinewidth=0.9,
-        **look,  # type: ignore[arg-type]
+        **look,
     )
 
 

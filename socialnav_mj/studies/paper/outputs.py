@@ -126,7 +126,7 @@ def _draw(experiment: Experiment, found: _Found, folder: Path) -> None:
         draw_sweep(found.sweep, found.sweep[SWITCH_DISTANCE], folder)
     if experiment.variants:
         draw_variants(found.tables, {variant.name: variant.title for variant in experiment.settings}, folder)
-    trained = {seed: load_policy(policy) for seed, policy in experiment.trainings.items()}
+    trained = {seed: load_policy(policy) for seed, policy in experiment.trainings().items()}
     if all("history" in policy.card for policy in trained.values()):
         draw_training_curves({seed: policy.card for seed, policy in trained.items()}, folder)
     draw_reward_maps({f"training {seed}": policy for seed, policy in trained.items()}, folder)
@@ -158,9 +158,12 @@ def _first_draws(experiment: Experiment, agents: pa.Table, name: str) -> pa.Tabl
 
 def _sweep(experiment: Experiment, results: Mapping[str, Results], table: LevelTable) -> dict[float, LevelTable]:
     """Levels by switch distance [m]: of every method at the default one, of the mixed policy at the others."""
-    if experiment.draws_of(SWEEP_RUN) < experiment.draws:
+    swept = experiment.sweep_roster(SWITCH_DISTANCE)
+    if experiment.draws_of(SWEEP_RUN) < experiment.draws or len(swept) < len(experiment.trainings()):
         agents = _first_draws(experiment, results[DEFAULT.name].agents, SWEEP_RUN)
-        table = LevelTable(rows=tuple(levels(make_panel(agents, experiment.roster(DEFAULT)))))
+        seeds = {entry.training_seed for entry in swept}
+        roster = [e for e in experiment.roster(DEFAULT) if e.training_seed is None or e.training_seed in seeds]
+        table = LevelTable(rows=tuple(levels(make_panel(agents, roster))))
     found = {SWITCH_DISTANCE: table}
     if SWEEP_RUN in results:
         for distance in SWEEP:

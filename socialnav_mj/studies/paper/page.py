@@ -11,6 +11,7 @@ from socialnav_mj.studies.looks import LOOKS, SCENARIO_TITLES
 from socialnav_mj.studies.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
 from socialnav_mj.studies.paper.figures import FIGURES
 from socialnav_mj.studies.paper.findings import Finding
+from socialnav_mj.studies.paper.plan import DEFAULT
 from socialnav_mj.studies.paper.training_curves import training_table
 
 _COLUMNS = (
@@ -86,7 +87,11 @@ def experiment_page(
         drawn = provenance["experiment"]["variant_draws"] or provenance["experiment"]["draws"]
         lines += ["## Other settings", "", f"Means over {drawn} draws.", ""]
         lines += ["![other settings](figures/figure_8_variants.png)", ""]
-    cards = {facts["training_seed"]: facts["card"] for facts in provenance["policies"].values()}
+    cards = {
+        facts["training_seed"]: facts["card"]
+        for facts in provenance["policies"].values()
+        if facts["card"]["config"]["turn_limit"] == DEFAULT.turn_limit
+    }
     lines += ["## Each training", "", *_trainings(table)]
     if all("history" in card for card in cards.values()):
         weight = next(iter(cards.values()))["config"]["intrusion_weight"]

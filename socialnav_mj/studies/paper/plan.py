@@ -1,18 +1,19 @@
 """The paper's study: which controllers run in which settings."""
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from socialnav_mj.config import Scenario
 from socialnav_mj.controllers.hybrid import Who
 from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.report.paired import HUMAN
-from socialnav_mj.studies.panel import MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry
+from socialnav_mj.studies.panel import CAPPED, MIXED, POTENTIAL_FIELD, REPLAY_IRL, ROBOTS, Entry
 from socialnav_mj.studies.study import Run, Study, learned
 
-ROBOTS = (POTENTIAL_FIELD, REPLAY_IRL, MIXED)
 SWITCH_DISTANCE = 2.0
 """The paper's [m]."""
 SWEEP = (0.5, 1.0, 1.5, 3.0, 4.0, 5.0)
@@ -29,23 +30,35 @@ class Variant:
     """What it changes."""
     task_kwargs: dict[str, Any] = field(default_factory=dict)
     """Keyword arguments of the tasks."""
-    attraction_limit: float | None = 1.0
-    """Of the potential field, alone and in the hybrid; None for eq 3 as printed."""
+    field: str = POTENTIAL_FIELD
+    """Controller that stands where the paper's potential field stands, alone and in the hybrid."""
     who: Who = "pedestrians"
     """Who counts in the switch of the hybrid."""
     runs: tuple[str, ...] = ROBOTS
     """Methods that it changes; the others are those of the default setting."""
+    is_full: bool = False
+    """Whether it has as many draws and trainings as the default setting, whatever is asked of the others."""
+
+    @property
+    def turn_limit(self) -> str:
+        """Under which its policies are to have been trained."""
+        return str(self.task_kwargs.get("turn_limit", Scenario.turn_limit))
 
 
-DEFAULT = Variant(name="default", title="default")
+DEFAULT = Variant(name="default", title="default", is_full=True)
 VARIANTS: tuple[Variant, ...] = (
     DEFAULT,
-    Variant(name="turn_per_second", title="turn limit per second", task_kwargs={"turn_limit": "per_second"}),
+    Variant(name="capped", title="capped field in the paper's place", field=CAPPED, runs=(MIXED,), is_full=True),
+    Variant(
+        name="turn_per_second",
+        title="turn limit per second, policies trained for it",
+        task_kwargs={"turn_limit": "per_second"},
+        is_full=True,
+    ),
     Variant(name="radii_0.25", title="radii sum 0.25 m", task_kwargs={"pedestrian_radius": 0.08}),
     Variant(name="radii_0.40", title="radii sum 0.40 m", task_kwargs={"pedestrian_radius": 0.23}),
     Variant(name="retire", title="retire on collision", task_kwargs={"on_collision": "retire"}),
     Variant(name="switch_anyone", title="agents count in the switch", who="anyone", runs=(MIXED,)),
-    Variant(name="pf_as_printed", title="PF as printed", attraction_limit=None, runs=(POTENTIAL_FIELD, MIXED)),
 )
 """The default setting first."""
 
@@ -59,26 +72,52 @@ class Experiment(Study):
     variants: bool = False
     """Whether to run the other settings and the sweep of the switch distance as well."""
     variant_draws: int | None = None
-    """Draws of the other settings and the sweep, the first ones of `draws`; None for all."""
+    """Draws of the sweep and of settings that are not full, the first ones of `draws`; None for all."""
+    variant_trainings: int | None = None
+    """Trainings of the same, those with the least seeds; None for all."""
 
     def __post_init__(self) -> None:
         if self.variant_draws is not None and not 1 <= self.variant_draws <= self.draws:
             raise ValueError(f"variant_draws = {self.variant_draws} is not allowed; allowed: 1 to draws = {self.draws}")
+        if self.variant_trainings is not None and self.variant_trainings < 1:
+            raise ValueError(f"variant_trainings = {self.variant_trainings} is not allowed; allowed: integers >= 1")
         if not self.policies:
             raise ValueError("policies = () is not allowed; allowed: one or more trained policies")
-        seeds = [load_policy(policy).training_seed for policy in self.policies]
-        if len(set(seeds)) < len(seeds):
-            raise ValueError(f"policies {self.policies} have training seeds {seeds}; allowed: one of each")
+        for limit, policies in self._by_turn_limit.items():
+            seeds = [load_policy(policy).training_seed for policy in policies]
+            if len(set(seeds)) < len(seeds):
+                raise ValueError(f"policies {policies} ({limit}) have training seeds {seeds}; allowed: one of each")
+        missing = [v.title for v in self.settings if v.turn_limit not in self._by_turn_limit]
+        if missing:
+            raise ValueError(
+                f"policies {self.policies} were trained for the turn limits {', '.join(self._by_turn_limit)}; "
+                f"there is none for: {', '.join(missing)}"
+            )
 
     @cached_property
-    def trainings(self) -> dict[int, str]:
-        """Training seed: policy, ascending."""
-        return dict(sorted((load_policy(policy).training_seed, policy) for policy in self.policies))
+    def _by_turn_limit(self) -> dict[str, list[str]]:
+        result: dict[str, list[str]] = {}
+        for policy in self.policies:
+            result.setdefault(load_policy(policy).turn_limit, []).append(policy)
+        return result
 
     @property
     def settings(self) -> tuple[Variant, ...]:
         """The default setting, and the others if they are asked for."""
         return VARIANTS if self.variants else VARIANTS[:1]
+
+    def trainings(self, variant: Variant = DEFAULT) -> dict[int, str]:
+        """Policies of a setting.
+
+        Args:
+            variant: The setting.
+
+        Returns:
+            Training seed: policy, ascending.
+        """
+        policies = {load_policy(policy).training_seed: policy for policy in self._by_turn_limit[variant.turn_limit]}
+        count = None if variant.is_full else self.variant_trainings
+        return dict(sorted(policies.items())[:count])
 
     def roster(self, variant: Variant) -> tuple[Entry, ...]:
         """All controllers of a setting.
@@ -87,36 +126,29 @@ class Experiment(Study):
             variant: The setting.
 
         Returns:
-            Potential field, ReplayIRL and hybrid of each training, and the human row.
+            Both potential fields (in the setting "capped" one, in the paper's place), ReplayIRL and hybrid of each
+            training, and the human row.
         """
-        far = _potential_field(variant)
+        capped = () if variant.field == CAPPED else (Entry(controller=CAPPED, method=CAPPED),)
+        trained = self.trainings(variant)
         return (
-            Entry(controller=far, method=POTENTIAL_FIELD),
-            *(Entry(controller=learned(p), method=REPLAY_IRL, training_seed=k) for k, p in self.trainings.items()),
-            *self._mixed(far, SWITCH_DISTANCE, variant.who),
+            Entry(controller=variant.field, method=POTENTIAL_FIELD),
+            *capped,
+            *(Entry(controller=learned(p), method=REPLAY_IRL, training_seed=k) for k, p in trained.items()),
+            *_mixed(variant, trained, SWITCH_DISTANCE),
             Entry(controller=HUMAN, method=HUMAN),
         )
 
     def sweep_roster(self, distance: float) -> tuple[Entry, ...]:
-        """The hybrids at another switch distance.
+        """The hybrids at a switch distance.
 
         Args:
             distance: [m].
 
         Returns:
-            One for each training.
+            One for each training that the sweep has.
         """
-        return self._mixed(_potential_field(DEFAULT), distance, DEFAULT.who)
-
-    def _mixed(self, far: str, distance: float, who: Who) -> tuple[Entry, ...]:
-        return tuple(
-            Entry(
-                controller=f"hybrid(near={learned(p)!r}, far={far!r}, switch_distance={distance!r}, who={who!r})",
-                method=MIXED,
-                training_seed=k,
-            )
-            for k, p in self.trainings.items()
-        )
+        return _mixed(_SWEPT, self.trainings(_SWEPT), distance)
 
     def draws_of(self, name: str) -> int:
         """Number of draws of a run.
@@ -127,7 +159,8 @@ class Experiment(Study):
         Returns:
             At least 1.
         """
-        return self.draws if name == DEFAULT.name else self.variant_draws or self.draws
+        is_full = any(variant.name == name and variant.is_full for variant in VARIANTS)
+        return self.draws if is_full else self.variant_draws or self.draws
 
     def runs(self) -> list[Run]:
         """Everything that has to be evaluated.
@@ -157,8 +190,20 @@ class Experiment(Study):
         return Run(name=name, evaluation=evaluation, roster=roster)
 
 
-def _potential_field(variant: Variant) -> str:
-    return "potential_field" if variant.attraction_limit == 1.0 else "potential_field(attraction_limit=None)"
+_SWEPT = replace(DEFAULT, is_full=False)
+
+
+def _mixed(variant: Variant, trained: Mapping[int, str], distance: float) -> tuple[Entry, ...]:
+    """A hybrid for each training."""
+    return tuple(
+        Entry(
+            controller=f"hybrid(near={learned(p)!r}, far={variant.field!r}, switch_distance={distance!r}, "
+            f"who={variant.who!r})",
+            method=MIXED,
+            training_seed=k,
+        )
+        for k, p in trained.items()
+    )
 
 
 def shipped_for(dataset: str, features: str = "continuous") -> tuple[str, ...]:
@@ -169,12 +214,12 @@ def shipped_for(dataset: str, features: str = "continuous") -> tuple[str, ...]:
         features: Name of the feature set.
 
     Returns:
-        Names, one for each training seed.
+        Names, one for each turn limit and training seed.
 
     Raises:
         ValueError: If there is none.
     """
-    pattern = re.compile(rf"{re.escape(dataset)}_{re.escape(features)}_seed\d+")
+    pattern = re.compile(rf"{re.escape(dataset)}_{re.escape(features)}(_per_second)?_seed\d+")
     found = tuple(name for name in shipped_policies() if pattern.fullmatch(name))
     if not found:
         raise ValueError(

@@ -36,7 +36,7 @@ def draw_variants(tables: Mapping[str, LevelTable], titles: Mapping[str, str], f
                 ends = np.array([[interval.low, interval.high] for _, interval in lines]).reshape(-1, 2)
                 axes.errorbar(
                     mean,
-                    [y + 0.19 * (k - 1.5) for y, _ in lines],
+                    [y + 0.16 * (k - 2.0) for y, _ in lines],
                     xerr=np.maximum(np.nan_to_num([mean - ends[:, 0], ends[:, 1] - mean]), 0.0),
                     color=look.colour,
                     marker=look.marker,
@@ -54,5 +54,5 @@ def draw_variants(tables: Mapping[str, LevelTable], titles: Mapping[str, str], f
         row[0].set_yticks(range(len(names)), [titles[name] for name in names])
         row[0].set_ylim(len(names) - 0.5, -0.5)
         handles, labels = row[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+        figure.legend(handles, labels, loc="outside upper center", ncols=5)
         return save(figure, folder, "figure_8_variants")
