@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 from socialnav_mj.geometry import Array
 
+IMPACT_DURATION = 0.1
+"""How long after the first touch forces belong to the impact; what comes later is a push. Twice the contact's time
+constant of 0.05 s, in which a struck robot takes on the speed of who struck it [s]."""
+
 
 class Partner(IntEnum):
     """Whom an agent touched."""
@@ -32,8 +36,12 @@ class Contact:
     agent_heading: float
     agent_velocity: Array
     partner_velocity: Array
-    impulse: float
-    peak_force: float
+    impact_impulse: float
+    impact_force: float
+    push_duration: float
+    push_impulse: float
+    push_force: float
+    peak_time: float
     squeeze: float
 
     def seen_by_partner(self, heading: float) -> "Contact":
@@ -58,6 +66,16 @@ class Contact:
 
 INTEGER_COLUMNS = ("agent", "partner_kind", "partner")
 """Fields of `Contact` that are whole numbers."""
+FORCE_COLUMNS = (
+    "impact_impulse",
+    "impact_force",
+    "push_duration",
+    "push_impulse",
+    "push_force",
+    "peak_time",
+    "squeeze",
+)
+"""Fields of `Contact` that only a simulation knows: NaN in the human row."""
 PLANAR_COLUMNS = ("position", "normal", "agent_velocity", "partner_velocity")
 """Fields of `Contact` that have two coordinates."""
 

@@ -22,7 +22,7 @@ __all__ = ["Array", "Episode", "EpisodeError", "IntArray", "Outcome", "Partner",
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-FORMAT = "socialnav_mj.episode/3"
+FORMAT = "socialnav_mj.episode/4"
 MAX_BYTES = 1 << 30
 """An episode file whose arrays are larger is not read: a small file can ask for any amount of memory."""
 
@@ -100,13 +100,22 @@ class Episode:
     """(k, 2) just before the touch [m/s]."""
     contact_partner_velocity: Array
     """(k, 2) just before the touch; a pedestrian's is the recorded one [m/s]."""
-    contact_impulse: Array
-    """(k,) integral of the normal force over the touch; NaN where there is no physics (human row) [N s]."""
-    contact_peak_force: Array
-    """(k,) largest normal force of one physics step; NaN where there is no physics [N]."""
+    contact_impact_impulse: Array
+    """(k,) integral of the normal force over the first 0.1 s after the first touch. It and the columns below are
+    NaN where there is no physics (human row) [N s]."""
+    contact_impact_force: Array
+    """(k,) largest normal force of one physics step of the first 0.1 s [N]."""
+    contact_push_duration: Array
+    """(k,) time in touch after the first 0.1 s [s]."""
+    contact_push_impulse: Array
+    """(k,) integral of the normal force after the first 0.1 s [N s]."""
+    contact_push_force: Array
+    """(k,) largest normal force after the first 0.1 s; sideways it is chatter, see docs/metrics.md [N]."""
+    contact_peak_time: Array
+    """(k,) when the larger of the two largest forces acted, after the first touch [s]."""
     contact_squeeze: Array
     """(k,) largest force by which either robot of the touch was squeezed while it lasted: half of what the normal
-    forces on it have in sum more than their resultant, which moves it; NaN where there is no physics [N]."""
+    forces on it have in sum more than their resultant, which moves it [N]."""
 
     policies: tuple[str, ...]
     """Names that `agent_policy` indexes; the controller's name alone if it never switches."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.cast import cast_recording
 from socialnav_mj.config import Scenario
-from socialnav_mj.contact import Contact, contact_columns
+from socialnav_mj.contact import FORCE_COLUMNS, Contact, contact_columns
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.geometry import Array, wrap_angle
 from socialnav_mj.provenance import episode_metadata, state_hash
@@ -153,9 +153,7 @@ def _contacts(recording: Recording, scenario: Scenario, people: list[_Person], p
                     agent_heading=float(heading),
                     agent_velocity=own_velocity,
                     partner_velocity=other_velocity,
-                    impulse=np.nan,
-                    peak_force=np.nan,
-                    squeeze=np.nan,
+                    **dict.fromkeys(FORCE_COLUMNS, np.nan),
                 )
                 for agent, other, direction, heading, own_velocity, other_velocity in sides
                 if agent.kind == Partner.AGENT

@@ -116,8 +116,12 @@ class Recorder:
                 agent_heading=touch.agent_heading,
                 agent_velocity=touch.agent_velocity,
                 partner_velocity=touch.partner_velocity,
-                impulse=touch.impulse,
-                peak_force=touch.peak_force,
+                impact_impulse=touch.impact_impulse,
+                impact_force=touch.impact_force,
+                push_duration=touch.push_duration,
+                push_impulse=touch.push_impulse,
+                push_force=touch.push_force,
+                peak_time=touch.peak_time,
                 squeeze=touch.squeeze,
             )
             contacts.append(contact)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from socialnav_mj.episode import Partner
+from socialnav_mj.contact import IMPACT_DURATION, Partner
 from socialnav_mj.geometry import Array, yaw_of_quaternion
 from socialnav_mj.scene_index import SceneIndex
 
@@ -36,12 +36,39 @@ class Touch:
     """(2,) just before [m/s]."""
     partner_velocity: Array
     """(2,) just before; a pedestrian's is the recorded one, not the mocap body's, which the solver takes as 0 [m/s]."""
-    impulse: float = 0.0
-    """Integral of the normal force so far [N s]."""
-    peak_force: float = 0.0
-    """Largest normal force so far [N]."""
+    impact_impulse: float = 0.0
+    """Integral of the normal force over the physics steps that began within `IMPACT_DURATION` [N s]."""
+    impact_force: float = 0.0
+    """Largest normal force of one of these steps [N]."""
+    push_duration: float = 0.0
+    """Time in touch after them, so far [s]."""
+    push_impulse: float = 0.0
+    """Integral of the normal force after them, so far [N s]."""
+    push_force: float = 0.0
+    """Largest normal force after them, so far [N]."""
+    peak_time: float = 0.0
+    """When the largest force of all so far acted, after the first touch [s]."""
     squeeze: float = 0.0
     """Largest force so far by which either robot of the touch was squeezed, see `squeeze_force` [N]."""
+
+    def feel(self, force: float, *, time: float, timestep: float) -> None:
+        """Take in the force of one physics step.
+
+        Args:
+            force: Normal force [N].
+            time: At the beginning of the step [s].
+            timestep: Its length [s].
+        """
+        since = time - self.time
+        if force > max(self.impact_force, self.push_force):
+            self.peak_time = since
+        if since < IMPACT_DURATION - 1e-9:
+            self.impact_impulse += force * timestep
+            self.impact_force = max(self.impact_force, force)
+        else:
+            self.push_duration += timestep
+            self.push_impulse += force * timestep
+            self.push_force = max(self.push_force, force)
 
 
 def squeeze_force(forces: Array) -> float:
@@ -141,9 +168,7 @@ class TouchLog:
                 self._new.append(touch)
             touch.last_time = time
         for pair, force in forces.items():
-            touch = self._open[pair]
-            touch.impulse += force * timestep
-            touch.peak_force = max(touch.peak_force, force)
+            self._open[pair].feel(force, time=time, timestep=timestep)
         if len(pushes) > 1:
             self._note_squeeze(pushes)
 

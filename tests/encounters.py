@@ -40,7 +40,7 @@ def encounters() -> dict[str, Encounter]:
     group = [Pedestrian(positions=np.tile((4, y), (41, 1))) for y in (0.9, 1.7, 2.5)]
     walk_in = [Pedestrian(positions=line((4.1, 0), (-0.9, 0), 25))]
     stand = Agent(positions=np.zeros((26, 2)), goal=(5, 0), outcome=Outcome.TIMED_OUT)
-    touch = Touch(agent=0, partner=0, step=18.9, duration=0.3, impulse=8.0, peak_force=180.0)
+    touch = Touch(agent=0, partner=0, step=18.9, duration=0.3, impact_impulse=8.0, impact_force=180.0, push_impulse=6.0)
 
     def waiting(k: int) -> float:
         return 0.2 * k if k <= 15 else 3.0 if k <= 25 else 3.0 + 0.2 * (k - 25)
@@ -133,7 +133,10 @@ def encounters() -> dict[str, Encounter]:
                 "first_partner": 0,
                 "struck_standing": 1,
                 "largest_closing_speed": 1.0,
-                "largest_peak_force": 180.0,
+                "largest_impact_force": 180.0,
+                "largest_impact_impulse": 8.0,
+                "push_duration": 0.2,  # 0.3 s less the 0.1 s of the impact
+                "push_impulse": 6.0,
             },
         ),
     }
@@ -173,7 +176,12 @@ ORDINARY: dict[str, float] = {
     "repeated_collisions": 0,
     "struck_standing": 0,
     "largest_closing_speed": NAN,
-    "largest_peak_force": NAN,
+    "largest_impact_force": NAN,
+    "largest_impact_impulse": NAN,
+    "push_duration": 0.0,
+    "push_impulse": 0.0,
+    "shoved_standing": 0,
+    "time_shoved_standing": 0.0,
     "spawn_delay": 0.0,
 }
 """Of an agent that drives 8 m straight at 1 m/s to within 0.5 m of its goal and touches nobody."""

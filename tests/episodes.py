@@ -73,10 +73,18 @@ class Touch:
     kind: Partner = Partner.PEDESTRIAN
     duration: float = 0.05
     """[s]."""
-    impulse: float = 1.0
+    impact_impulse: float = 1.0
     """[N s]."""
-    peak_force: float = 20.0
+    impact_force: float = 20.0
     """[N]."""
+    push_duration: float | None = None
+    """[s]; the duration after the first 0.1 s if not given."""
+    push_impulse: float = 0.0
+    """[N s]."""
+    push_force: float = 0.0
+    """[N]."""
+    peak_time: float = 0.03
+    """[s]."""
     squeeze: float = 0.0
     """[N]."""
 
@@ -246,7 +254,15 @@ def _contacts(
         "contact_partner_velocity": np.array(
             [o["velocity"][at, j] for o, (_, _, j, at) in zip(other, rows, strict=True)]
         ).reshape(k, 2),
-        "contact_impulse": np.array([touch.impulse for touch, *_ in rows], dtype=float),
-        "contact_peak_force": np.array([touch.peak_force for touch, *_ in rows], dtype=float),
-        "contact_squeeze": np.array([touch.squeeze for touch, *_ in rows], dtype=float),
+        "contact_push_duration": np.array(
+            [
+                max(touch.duration - 0.1, 0.0) if touch.push_duration is None else touch.push_duration
+                for touch, *_ in rows
+            ],
+            dtype=float,
+        ),
+        **{
+            f"contact_{name}": np.array([getattr(touch, name) for touch, *_ in rows], dtype=float)
+            for name in ("impact_impulse", "impact_force", "push_impulse", "push_force", "peak_time", "squeeze")
+        },
     }

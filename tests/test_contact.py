@@ -5,7 +5,7 @@ from dataclasses import FrozenInstanceError, fields, replace
 import numpy as np
 import pytest
 
-from socialnav_mj.contact import Contact, Partner, contact_columns
+from socialnav_mj.contact import FORCE_COLUMNS, Contact, Partner, contact_columns
 from socialnav_mj.episode import Episode
 
 TOUCH = Contact(
@@ -19,8 +19,12 @@ TOUCH = Contact(
     agent_heading=0.3,
     agent_velocity=np.array([1.0, 0.0]),
     partner_velocity=np.array([0.0, -0.5]),
-    impulse=3.0,
-    peak_force=90.0,
+    impact_impulse=3.0,
+    impact_force=90.0,
+    push_duration=0.15,
+    push_impulse=4.0,
+    push_force=60.0,
+    peak_time=0.02,
     squeeze=12.0,
 )
 
@@ -31,7 +35,7 @@ def test_other_side_of_a_touch_exchanges_the_parties_and_keeps_what_they_share()
     np.testing.assert_array_equal(other.normal, [-0.6, -0.8])
     np.testing.assert_array_equal(other.agent_velocity, TOUCH.partner_velocity)
     np.testing.assert_array_equal(other.partner_velocity, TOUCH.agent_velocity)
-    for name in ("time", "duration", "position", "impulse", "peak_force", "squeeze"):
+    for name in ("time", "duration", "position", *FORCE_COLUMNS):
         assert getattr(other, name) is getattr(TOUCH, name)
     with pytest.raises(FrozenInstanceError):
         other.time = 0.0

@@ -34,7 +34,7 @@ def test_crossing_tracks_touch_when_where_and_as_fast_as_the_closed_form_says():
     np.testing.assert_allclose(episode.contact_partner_velocity, [[0.0, 1.0]], atol=1e-9)
     np.testing.assert_allclose(episode.contact_closing_speed, [0.4 / math.sqrt(0.1)], rtol=1e-6)
     np.testing.assert_allclose(episode.contact_agent_heading, [0.0], atol=1e-9)
-    assert np.isnan(episode.contact_impulse).all() and np.isnan(episode.contact_peak_force).all()
+    assert np.isnan(episode.contact_impact_impulse).all() and np.isnan(episode.contact_impact_force).all()
 
 
 def test_two_replaced_people_stand_in_two_mirrored_rows():

@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from socialnav_mj import metrics
+from socialnav_mj.config import Robot
+from socialnav_mj.contact import FORCE_COLUMNS
 from socialnav_mj.episode import Partner
 from socialnav_mj.metrics import contacts, severity
 from socialnav_mj.metrics.contacts import Fault
@@ -98,30 +100,65 @@ def test_agent_that_drives_is_not_struck_standing_and_neither_is_one_that_nobody
 
 
 @pytest.mark.parametrize(
-    ("force", "duration", "what"),
+    ("force", "duration", "push", "what"),
     [
-        (130.0, 9.0, Severity.UNDER_QUASI_STATIC),
-        (131.0, 0.5, Severity.UNDER_TRANSIENT),
-        (260.0, 0.5, Severity.UNDER_TRANSIENT),
-        (131.0, 0.51, Severity.OVER),
-        (261.0, 0.1, Severity.OVER),
+        (130.0, 9.0, 0.0, Severity.UNDER_QUASI_STATIC),
+        (131.0, 0.5, 0.0, Severity.UNDER_TRANSIENT),
+        (260.0, 9.0, 130.0, Severity.UNDER_TRANSIENT),  # the impact alone is held against 260 N
+        (261.0, 0.05, 0.0, Severity.OVER),
+        (20.0, 0.6, 131.0, Severity.OVER),  # a push of 0.5 s at 131 N
+        (20.0, 0.5, 131.0, Severity.UNDER_QUASI_STATIC),  # not longer than 0.5 s
     ],
 )
-def test_severity_is_130_newtons_and_260_for_half_a_second(force, duration, what):
-    episode = meeting(0.0, -1.0, peak_force=force, duration=duration)
-    assert severity.severity(episode, episode.contact_peak_force).tolist() == [what]
+def test_impact_is_held_against_260_newtons_and_a_lasting_push_against_130(force, duration, push, what):
+    pushed = max(duration - 0.1, 0.0)
+    touch = {"impact_force": force, "duration": duration, "push_impulse": push * pushed, "push_force": 9000.0}
+    episode = meeting(0.0, -1.0, **touch)
+    assert severity.pushing_force(episode) == pytest.approx([push])
+    assert severity.severity(episode, episode.contact_impact_force).tolist() == [what]
     assert metrics.collisions_by_severity(episode, what).tolist() == [1.0]
-    assert metrics.largest_peak_force(episode).tolist() == [force]
+    assert metrics.largest_impact_force(episode).tolist() == [force]
+    wedged = meeting(0.0, -1.0, **touch, squeeze=601.0)
+    assert severity.severity(wedged, wedged.contact_impact_force)[0] == (
+        Severity.OVER if force > 260 else Severity.UNDER_TRANSIENT if force > 130 else Severity.UNDER_QUASI_STATIC
+    )
 
 
-def test_contact_during_another_is_clamped_and_its_force_not_told():
+def test_contact_is_clamped_if_another_body_is_touched_during_its_impact():
     people = [Pedestrian(positions=np.tile((x, 0), (21, 1))) for x in (0.3, -0.3)]
     agent = Agent(positions=np.zeros((21, 2)), goal=(3, 0))
-    touches = [Touch(agent=0, partner=0, step=5, duration=0.4, peak_force=9000), Touch(agent=0, partner=1, step=6)]
-    episode = build_episode([agent], people, [*touches, Touch(agent=0, partner=0, step=9, peak_force=50)])
-    assert severity.clamped(episode).tolist() == [True, True, False]
-    assert metrics.largest_peak_force(episode).tolist() == [50.0]
-    assert [metrics.collisions_by_severity(episode, what)[0] for what in Severity] == [1, 0, 0, 2]
+    # From 1.0 s the first, whom the second joins after 0.2 s, when the impact of the first is over; another at 1.8 s.
+    held = [Touch(agent=0, partner=0, step=5, duration=0.4, impact_force=90), Touch(agent=0, partner=1, step=6)]
+    episode = build_episode([agent], people, [*held, Touch(agent=0, partner=0, step=9, impact_force=50)])
+    assert severity.clamped(episode).tolist() == [False, True, False]
+    assert metrics.largest_impact_force(episode).tolist() == [90.0]
+    assert [metrics.collisions_by_severity(episode, what)[0] for what in Severity] == [2, 0, 0, 1]
+    together = [held[0], replace(held[1], step=5.4)]
+    episode = build_episode([agent], people, together)
+    assert severity.clamped(episode).tolist() == [True, True]
+    assert np.isnan(metrics.largest_impact_force(episode)).all()
+
+
+def test_push_is_summed_over_collisions_and_wedged_ones_have_no_impulse():
+    agents = [Agent(positions=np.zeros((21, 2)), goal=(3, 0)), Agent(positions=np.full((21, 2), 5.0), goal=(9, 9))]
+    people = [Pedestrian(positions=np.tile((0.3, 0), (21, 1)))]
+    touches = [
+        Touch(agent=0, partner=0, step=2, duration=0.5, push_impulse=10.0),
+        Touch(agent=0, partner=0, step=8, duration=0.7, push_duration=0.3, push_impulse=9e3, squeeze=1e4),
+    ]
+    episode = build_episode(agents, people, touches)
+    assert metrics.push_duration(episode) == pytest.approx([0.4 + 0.3, 0.0])
+    assert metrics.push_impulse(episode).tolist() == [10.0, 0.0]
+
+
+@pytest.mark.parametrize(("pushed", "shoved"), [(0.99, 0), (1.0, 1), (3.0, 1)])
+def test_standing_agent_that_is_pushed_for_a_second_was_shoved(pushed, shoved):
+    episode = meeting(0.0, -1.0, push_duration=pushed)
+    assert metrics.shoved_standing(episode).tolist() == [shoved]
+    assert metrics.time_shoved_standing(episode).tolist() == [pushed * shoved]
+    for other in (meeting(0.5, -1.0, push_duration=pushed), meeting(0.0, 0.0, push_duration=pushed)):
+        assert metrics.shoved_standing(other).tolist() == [0.0] == metrics.time_shoved_standing(other).tolist()
+        assert metrics.push_duration(other).tolist() == [pushed]
 
 
 def test_contact_of_a_robot_squeezed_by_more_than_mass_and_drive_explain_is_wedged():
@@ -133,24 +170,44 @@ def test_contact_of_a_robot_squeezed_by_more_than_mass_and_drive_explain_is_wedg
 
 
 def test_human_row_has_no_force_and_no_severity():
-    episode = meeting(0.0, -1.0, peak_force=math.nan, impulse=math.nan)
+    episode = meeting(0.0, -1.0, **dict.fromkeys(FORCE_COLUMNS, math.nan))
     assert np.isnan(metrics.collisions_by_severity(episode, Severity.OVER)).all()
-    assert np.isnan(metrics.largest_peak_force(episode)).all()
+    for metric in (metrics.largest_impact_force, metrics.largest_impact_impulse, metrics.push_duration):
+        assert np.isnan(metric(episode)).all()
+    for metric in (metrics.push_impulse, metrics.shoved_standing, metrics.time_shoved_standing):
+        assert np.isnan(metric(episode)).all()
     assert metrics.largest_closing_speed(episode) == pytest.approx([1.0])
 
 
-@given(speed=st.floats(0.01, 3))
-def test_flesh_force_holds_the_energy_of_the_impact(speed):
-    """ISO/TS 15066 A.3: F^2 / (2 k) = mu v^2 / 2."""
-    force = float(severity.flesh_force(meeting(0.0, -speed))[0])
-    reduced = severity.ROBOT_MASS * severity.LEG_MASS / (severity.ROBOT_MASS + severity.LEG_MASS)
-    assert force**2 / severity.LEG_STIFFNESS == pytest.approx(reduced * speed**2)
-    assert force == pytest.approx(659 * speed, rel=1e-3)
+@given(speed=st.floats(0.01, 3), way=st.floats(-math.pi, math.pi))
+def test_impact_exchanges_the_momentum_and_flesh_holds_the_energy_of_two_bodies(speed, way):
+    """ISO/TS 15066 A.3: F^2 / (2 k) = mu v^2 / 2; mu with the rotors' 2.52 kg for a push along the wheels."""
+    # The robot looks along `way`, and the person comes from the east.
+    agent = Agent(positions=line((0, 0), (math.cos(way) * 1e-9, math.sin(way) * 1e-9), 5), goal=(9, 9))
+    person = Pedestrian(positions=line((0.3, 0), (0.3 - speed, 0), 5))
+    episode = build_episode([agent], [person], [Touch(agent=0, partner=0, step=0)])
+    inverse = math.cos(way) ** 2 / 10.5222 + math.sin(way) ** 2 / 8.0 + 1.0 / 75.0
+    assert float(severity.impact_momentum(episode)[0]) == pytest.approx(speed / inverse, rel=1e-4)
+    force = float(severity.flesh_force(episode)[0])
+    assert force**2 / severity.LEG_STIFFNESS == pytest.approx(speed**2 / inverse, rel=1e-4)
 
 
-def test_robot_mass_is_the_models():
-    masses = re.findall(r'<inertial[^>]*?mass="([0-9.]+)"', (assets_folder() / "robot.xml").read_text())
+def test_flesh_is_harder_along_the_wheels_than_across():
+    assert severity.reduced_mass(np.array([0.0, math.pi / 2, math.pi])) == pytest.approx(
+        [9.2276, 7.2289, 9.2276], rel=1e-4
+    )
+    assert float(severity.flesh_force(meeting(0.01, -0.99))[0]) == pytest.approx(744, abs=1)
+
+
+def test_masses_are_the_models():
+    text = (assets_folder() / "robot.xml").read_text()
+    masses = re.findall(r'<inertial[^>]*?mass="([0-9.]+)"', text)
     assert sum(map(float, masses)) == pytest.approx(severity.ROBOT_MASS)
+    (armature,), inertias = re.findall(r'armature="([0-9.]+)"', text), re.findall(r'2.9e-4 ([0-9.e-]+) 2.9e-4"', text)
+    radius = Robot().wheel_radius
+    assert len(inertias) == 2
+    rotors = sum(float(armature) + float(inertia) for inertia in inertias) / radius**2
+    assert rotors == pytest.approx(severity.ROTOR_MASS)
 
 
 @pytest.mark.parametrize(("gap", "met"), [(0.31, True), (0.33, False)])

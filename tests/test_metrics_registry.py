@@ -15,6 +15,7 @@ from encounters import encounters
 from episodes import Agent, Pedestrian, Touch, build_episode, line
 
 from socialnav_mj import metrics
+from socialnav_mj.contact import FORCE_COLUMNS
 from socialnav_mj.episode import Outcome, Partner
 from socialnav_mj.learning import shipping
 from socialnav_mj.metrics import METRICS, Kind, Mean, Missing, Need
@@ -47,11 +48,11 @@ def crowd():
     ]
     people = [standing((2, 0.3), 24), Pedestrian(positions=line((4, 1.2), (0, 1.2), 20)), standing((2, 2.2), 24)]
     touches = [
-        Touch(agent=0, partner=0, step=11.5, peak_force=150.0),
-        Touch(agent=0, partner=0, step=14, peak_force=90.0),
-        Touch(agent=1, partner=1, step=9, duration=0.8, peak_force=300.0),
-        Touch(agent=2, partner=2, step=2, duration=0.8, peak_force=9000.0, squeeze=8000.0),
-        Touch(agent=2, partner=1, step=3, duration=0.8, peak_force=8000.0),
+        Touch(agent=0, partner=0, step=11.5, impact_force=150.0),
+        Touch(agent=0, partner=0, step=14, impact_force=90.0),
+        Touch(agent=1, partner=1, step=9, duration=0.8, impact_force=300.0),
+        Touch(agent=2, partner=2, step=2, duration=0.8, impact_force=9000.0, squeeze=8000.0),
+        Touch(agent=2, partner=1, step=3, duration=0.8, impact_force=8000.0),
         *(Touch(agent=0, partner=other, step=step, kind=Partner.AGENT) for other, step in ((4, 9), (1, 6), (2, 3))),
     ]
     return build_episode(agents, people, touches)
@@ -59,7 +60,7 @@ def crowd():
 
 def as_human_row(episode):
     nothing = np.full(len(episode.contact_time), np.nan)
-    return replace(episode, contact_impulse=nothing, contact_peak_force=nothing, contact_squeeze=nothing)
+    return replace(episode, **{f"contact_{name}": nothing for name in FORCE_COLUMNS})
 
 
 EDGES = {

@@ -44,8 +44,8 @@ def make(controller, draw):
         Pedestrian(positions=np.tile((2, 1.2), (40, 1))),
     ]
     touches = [
-        Touch(agent=1, partner=1, step=10, peak_force=force, impulse=force / 10),
-        Touch(agent=0, partner=1, step=12, kind=Partner.AGENT, impulse=0.5, peak_force=5),
+        Touch(agent=1, partner=1, step=10, impact_force=force, impact_impulse=force / 10),
+        Touch(agent=0, partner=1, step=12, kind=Partner.AGENT, impact_impulse=0.5, impact_force=5),
     ]
     return build_episode(
         [Agent(positions=first, goal=(4, 0), person=7), second],
@@ -132,8 +132,10 @@ def test_table_of_collisions_has_a_row_for_each_side(results):
         (7, "agent", 8, rows[1]["fault"]),
         (8, "agent", 7, rows[2]["fault"]),
     ]
-    assert rows[0]["agent_standing"] and rows[0]["severity"] == "over" and rows[0]["peak_force"] == 300.0
-    assert rows[0]["closing_speed"] == pytest.approx(1.0) and rows[0]["flesh_force"] == pytest.approx(659, abs=1)
+    assert rows[0]["agent_standing"] and rows[0]["severity"] == "over" and rows[0]["impact_force"] == 300.0
+    assert rows[0]["closing_speed"] == pytest.approx(1.0) and rows[0]["flesh_force"] == pytest.approx(744, abs=1)
+    assert (rows[0]["clamped"], rows[0]["shoved"]) == (False, False)
+    assert rows[0]["impact_momentum"] == pytest.approx(9.23, abs=0.01)
     assert rows[1]["severity"] is None and rows[1]["closing_speed"] == pytest.approx(rows[2]["closing_speed"])
 
 
@@ -149,8 +151,8 @@ def test_report_says_who_was_at_fault(written):
 
 def test_report_says_how_hard(written):
     quick = cells(section(written, "How hard"), "quick")
-    # 100, 200, 300 and 400 N for 0.05 s; 8 kg of iron at 1 m/s would hurt
-    assert quick[2:] == ["4", "1.00", "1.00", "25.0", "1", "1", "2", "0", "0", "0", "4"]
+    # 100, 200, 300 and 400 N for 0.05 s, 10 to 40 N s; 10.5 kg of iron at 1 m/s would hurt, with 9.2 N s
+    assert quick[2:] == ["4", "1.00", "1.00", "25.0", "9.2", "0.00", "0", "1", "1", "2", "0", "0", "0", "4"]
     assert "human" not in section(written, "How hard").split("flesh: to 130 N")[1]
 
 

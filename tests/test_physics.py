@@ -127,7 +127,7 @@ def test_touch_of_two_robots_is_seen_by_both_sides() -> None:
     np.testing.assert_allclose(episode.contact_agent_velocity[0], -episode.contact_agent_velocity[1], atol=1e-6)
     np.testing.assert_array_equal(episode.contact_agent_velocity[:2], episode.contact_partner_velocity[1::-1])
     assert episode.contact_agent_velocity[0, 0] == pytest.approx(1.0, abs=0.01)
-    for column in ("time", "impulse", "peak_force", "duration"):
+    for column in ("time", "impact_impulse", "impact_force", "duration"):
         first, second = getattr(episode, f"contact_{column}")[:2]
         assert first == second > 0.0
 
@@ -207,7 +207,7 @@ def test_normal_points_from_the_agent_whatever_order_mujoco_names_the_bodies_in(
         (touch,) = flicker(physics_of(robot=model), (True, 3))
         assert touch.agent == 0 and touch.kind == Partner.PEDESTRIAN
         np.testing.assert_allclose(touch.normal, [1.0, 0.0], atol=1e-6)
-        assert touch.impulse > 0.0
+        assert touch.impact_impulse > 0.0
 
 
 def test_each_pair_is_counted_by_itself() -> None:
@@ -281,8 +281,34 @@ def test_impulse_is_the_momentum_that_a_walker_gives_to_a_free_robot() -> None:
     speed = float(-physics.agent_velocity()[0, 0])
     assert speed > 1.2  # the walker goes on, and the robot with it
     # 8 kg; the floor takes a thousandth while the robot rocks on its casters.
-    assert touch.impulse == pytest.approx(8.0 * speed, rel=0.003)
-    assert touch.peak_force * TIMESTEP < touch.impulse < touch.peak_force * (touch.last_time - touch.time + TIMESTEP)
+    assert touch.impact_impulse + touch.push_impulse == pytest.approx(8.0 * speed, rel=0.003)
+    assert touch.impact_force * TIMESTEP < touch.impact_impulse < touch.impact_force * 0.1
+
+
+def test_force_belongs_to_the_impact_for_a_tenth_of_a_second_and_to_the_push_after_it() -> None:
+    (touch,) = flicker(physics_of(), (True, 10))
+    assert touch.push_duration == touch.push_impulse == touch.push_force == 0.0 < touch.impact_force
+    (longer,) = flicker(physics_of(), (True, 25))
+    assert (longer.impact_impulse, longer.impact_force) == (touch.impact_impulse, touch.impact_force)
+    assert longer.push_duration == pytest.approx(15 * TIMESTEP)
+    assert longer.push_force * TIMESTEP < longer.push_impulse <= longer.push_force * longer.push_duration
+    # Time apart is no time of pushing, though the touch goes on.
+    (parted,) = flicker(physics_of(), (True, 12), (False, 10), (True, 3))
+    assert parted.push_duration == pytest.approx(5 * TIMESTEP)
+    assert parted.last_time - parted.time == pytest.approx(24 * TIMESTEP)
+
+
+def test_peak_is_told_with_its_time_wherever_it_was() -> None:
+    physics = physics_of()
+    near, deep = CONTACT_DISTANCE - 0.001, CONTACT_DISTANCE - 0.03
+    for at in (4, 14):
+        places = np.full((20, 2), (near, 0.0))
+        places[at, 0] = deep  # a jump for one step
+        physics.place_agent(0, np.zeros(2), 0.0)
+        (touch,) = lead(physics, places)
+        assert touch.peak_time == pytest.approx(at * TIMESTEP)
+        assert (touch.impact_force > touch.push_force) is (at < 10)
+        lead(physics, np.full((30, 2), AWAY))
 
 
 def test_impulse_between_two_free_robots_is_equal_and_opposite() -> None:
@@ -295,7 +321,7 @@ def test_impulse_between_two_free_robots_is_equal_and_opposite() -> None:
     (touch,) = physics.new_touches()
     first, second = physics.agent_velocity()[:, 0]
     assert first + second == pytest.approx(1.0, abs=0.005)  # momentum
-    assert touch.impulse == pytest.approx(8.0 * second, rel=0.003)
+    assert touch.impact_impulse + touch.push_impulse == pytest.approx(8.0 * second, rel=0.003)
     assert first**2 + second**2 < 1.0  # energy
     np.testing.assert_allclose(touch.agent_velocity, [1.0, 0.0], atol=0.01)
     np.testing.assert_allclose(touch.partner_velocity, 0.0, atol=0.01)
@@ -332,7 +358,7 @@ def test_pedestrian_moves_at_every_physics_step() -> None:
     physics = physics_of()
     positions = np.stack([1.0 - 1.3 * TIMESTEP * np.arange(150), np.zeros(150)], axis=-1)
     (touch,) = lead(physics, positions)
-    assert touch.peak_force < 500.0
+    assert max(touch.impact_force, touch.push_force) < 500.0
 
 
 def test_path_of_the_wrong_length_is_refused() -> None:

@@ -197,7 +197,7 @@ def test_touch_of_a_standing_person_is_recorded_with_its_physics():
     np.testing.assert_allclose(episode.contact_normal[0], [1.0, 0.0], atol=0.02)
     assert episode.contact_closing_speed[0] == pytest.approx(1.0, abs=0.03)
     np.testing.assert_allclose(episode.contact_position[0], [2.85, 0.0], atol=0.02)
-    assert episode.contact_impulse[0] > 0.0 and episode.contact_peak_force[0] > 0.0
+    assert episode.contact_impact_impulse[0] > 0.0 and episode.contact_impact_force[0] > 0.0
 
 
 def test_touch_of_two_agents_stands_in_two_mirrored_rows():
@@ -205,7 +205,7 @@ def test_touch_of_two_agents_stands_in_two_mirrored_rows():
     episode = rollout(environment_of(*walks, agents=[1, 2]), GoStraight())
     assert episode.contact_agent[:2].tolist() == [0, 1] and episode.contact_partner[:2].tolist() == [1, 0]
     np.testing.assert_array_equal(episode.contact_normal[0], -episode.contact_normal[1])
-    np.testing.assert_array_equal(episode.contact_impulse[::2], episode.contact_impulse[1::2])
+    np.testing.assert_array_equal(episode.contact_impact_impulse[::2], episode.contact_impact_impulse[1::2])
     assert episode.contact_closing_speed[0] == pytest.approx(episode.contact_closing_speed[1])
     assert episode.contact_closing_speed[0] == pytest.approx(2.0, abs=0.06)
 

@@ -354,9 +354,9 @@ def test_equal_configurations_give_equal_bits(on_collision: str) -> None:
     assert play(first, 150) == play(second, 150)
     assert len(first.task.collisions) > 3
     # Once more, in the environment that was used, from its end.
-    collisions = [(c.agent, c.partner, c.touch.time, c.touch.impulse) for c in first.task.collisions]
+    collisions = [(c.agent, c.partner, c.touch.time, c.touch.impact_impulse) for c in first.task.collisions]
     assert play(first, 150) == play(second, 150)
-    assert collisions == [(c.agent, c.partner, c.touch.time, c.touch.impulse) for c in first.task.collisions]
+    assert collisions == [(c.agent, c.partner, c.touch.time, c.touch.impact_impulse) for c in first.task.collisions]
 
 
 @pytest.mark.parametrize("steps", [1, 17, 30, 45])

@@ -33,8 +33,8 @@ def crowd() -> Episode:
             Pedestrian(positions=line((0, 2), (4, 2), 10), person=12, first_step=35),
         ],
         [
-            Touch(agent=0, partner=0, step=12.3, duration=0.15, impulse=4.0, peak_force=87.0),
-            Touch(agent=1, partner=0, step=15.0, kind=Partner.AGENT, peak_force=42.0),
+            Touch(agent=0, partner=0, step=12.3, duration=0.15, impact_impulse=4.0, impact_force=87.0),
+            Touch(agent=1, partner=0, step=15.0, kind=Partner.AGENT, impact_force=42.0),
         ],
         policies=("cautious", "bold"),
         scenario_name="scenario_2",
@@ -191,8 +191,8 @@ def test_touches_stand_once_with_partner_and_severity(episode: Episode, path: Pa
     assert [columns["Touch:robot"][t] for t in times] == [[3], [3]]
     assert [columns["Touch:partner_kind"][t] for t in times] == [["person"], ["robot"]]
     assert [columns["Touch:partner"][t] for t in times] == [[11], [5]]
-    assert [columns["Touch:peak_force"][t] for t in times] == [[87.0], [42.0]]
-    assert [columns["Touch:impulse"][t] for t in times] == [[4.0], [1.0]]
+    assert [columns["Touch:impact_force"][t] for t in times] == [[87.0], [42.0]]
+    assert [columns["Touch:impact_impulse"][t] for t in times] == [[4.0], [1.0]]
     assert [columns["Touch:duration"][t] for t in times] == [[0.15], [0.05]]
     closing = [columns["Touch:closing_speed"][t][0] for t in times]
     np.testing.assert_array_equal(closing, episode.contact_closing_speed[[0, 1]])
@@ -289,7 +289,7 @@ def test_events_tell_the_story_in_order(episode: Episode, path: Path) -> None:
 def test_human_row_has_touches_without_force(tmp_path: Path) -> None:
     robot = Agent(positions=line((0, 0), (2, 0), 5))
     person = Pedestrian(positions=line((2, 0.1), (0, 0.1), 5))
-    touch = Touch(agent=0, partner=0, step=2.0, impulse=np.nan, peak_force=np.nan)
+    touch = Touch(agent=0, partner=0, step=2.0, impact_impulse=np.nan, impact_force=np.nan)
     _, rows = read(write_trace(build_episode([robot], [person], [touch]), tmp_path / "human.rrd"))
     (label,) = rows["/scene/touches/now"]["Points3D:labels"].values()
     assert label[0].endswith("m/s")
@@ -302,7 +302,7 @@ def test_wedged_and_overturned_are_told_in_words(tmp_path: Path) -> None:
     ]
     people = [Pedestrian(positions=line((2, y), (0, y), 5)) for y in (0.1, 3.1)]
     touches = [
-        Touch(agent=i, partner=i, step=2.0, peak_force=40_673.0, squeeze=s) for i, s in enumerate((601.0, 599.0))
+        Touch(agent=i, partner=i, step=2.0, impact_force=40_673.0, squeeze=s) for i, s in enumerate((601.0, 599.0))
     ]
     episode = build_episode(robots, people, touches)
     first, second = severities(episode, touch_rows(episode))
@@ -343,3 +343,21 @@ def test_failed_write_leaves_the_old_file_alone(tmp_path: Path, monkeypatch: pyt
 def test_full_size_episode_fits_in_five_megabytes(tmp_path: Path) -> None:
     path = write_trace(full_size(), tmp_path / "full.rrd")
     assert path.stat().st_size <= 5_000_000
+
+
+def test_clamped_forces_are_not_shown_as_fact(tmp_path: Path) -> None:
+    robot = Agent(positions=line((0, 0), (2, 0), 10), goal=(9, 0), outcome=Outcome.TIMED_OUT)
+    people = [Pedestrian(positions=np.tile((x, 0.1), (11, 1))) for x in (0.4, 0.6, 1.6)]
+    touches = [
+        Touch(agent=0, partner=0, step=2.0, duration=0.4, impact_force=90.0, push_impulse=9.0),
+        Touch(agent=0, partner=1, step=2.3, impact_force=9000.0),
+        Touch(agent=0, partner=2, step=8.0, impact_force=70.0),
+    ]
+    episode = build_episode([robot], people, touches)
+    assert [text.split(", ")[1] for text in severities(episode, touch_rows(episode))] == ["clamped", "clamped", "70 N"]
+    _, rows = read(write_trace(episode, tmp_path / "clamped.rrd"))
+    columns = rows["/scene/touches/all"]
+    shown = [
+        [value[0] for _, value in sorted(columns[f"Touch:{name}"].items())] for name in ("impact_force", "push_impulse")
+    ]
+    np.testing.assert_array_equal(shown, [[np.nan, np.nan, 70.0], [9.0, 0.0, 0.0]])

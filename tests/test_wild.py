@@ -33,8 +33,8 @@ def test_broken_rules_are_told() -> None:
     assert "a robot at 99.00 m/s" in broken_rules(replace(run, speed=99.0), run.episode)[0]
     assert "3 bodies went through a robot" in broken_rules(replace(run, tunnels=3), run.episode)[0]
     assert "slots" in broken_rules(replace(run, lost_slots=1), run.episode)[0]
-    forces = np.full_like(run.episode.contact_impulse, np.inf)
-    endless = replace(run, episode=replace(run.episode, contact_impulse=forces))
+    forces = np.full_like(run.episode.contact_impact_impulse, np.inf)
+    endless = replace(run, episode=replace(run.episode, contact_impact_impulse=forces))
     assert broken_rules(endless, run.episode) == ["a contact force is not finite and >= 0"]
     told = summary([run, replace(other, broken=["it fell apart"])])
     assert "1 episodes broke a rule" in told and "seed 9" in told.splitlines()[-1] and "it fell apart" in told

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from socialnav_mj.cast import NOBODY
 from socialnav_mj.config import PEDESTRIAN_RADII, ROBOT_RADII, Robot, Scenario
+from socialnav_mj.contact import FORCE_COLUMNS
 from socialnav_mj.controllers import Controller, GoStraight, Limits, PotentialField
 from socialnav_mj.environment import Environment, build_environment
 from socialnav_mj.episode import Episode, Outcome
@@ -294,7 +295,7 @@ def broken_rules(run: Run, again: Episode) -> list[str]:
         broken.append("spawns and outcomes do not add up")
     if (outcome == Outcome.OVERTURNED).any() and run.tilt <= OVERTURNED_TILT:
         broken.append("overturned without a tilt")
-    forces = np.concatenate([episode.contact_impulse, episode.contact_peak_force, episode.contact_squeeze])
+    forces = np.concatenate([getattr(episode, f"contact_{name}") for name in FORCE_COLUMNS])
     if not np.isfinite(forces).all() or (forces < 0.0).any():
         broken.append("a contact force is not finite and >= 0")
     values = per_agent(episode)
@@ -314,7 +315,9 @@ def summary(runs: list[Run]) -> str:
     counts = ", ".join(f"{int((outcomes == outcome).sum())} {outcome.name.lower()}" for outcome in Outcome)
     squeezed = np.concatenate([run.episode.contact_squeeze for run in runs])
     held = np.concatenate([wedged(run.episode) for run in runs])
-    peak = np.concatenate([run.episode.contact_peak_force for run in runs])
+    peak = np.concatenate(
+        [np.maximum(run.episode.contact_impact_force, run.episode.contact_push_force) for run in runs]
+    )
     fastest, most = max(runs, key=lambda run: run.speed), max(runs, key=lambda run: run.tilt)
     return "\n".join(
         [

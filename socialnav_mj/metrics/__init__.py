@@ -7,13 +7,15 @@ declared where it is defined, in its module's `METRICS`; `registry` finds it the
 
 from socialnav_mj.metrics.collisions import NOBODY, collisions, first_partner
 from socialnav_mj.metrics.contacts import Fault
-from socialnav_mj.metrics.faults import (
-    collisions_by_fault,
+from socialnav_mj.metrics.faults import collisions_by_fault, largest_closing_speed, repeated_collisions, struck_standing
+from socialnav_mj.metrics.forces import (
     collisions_by_severity,
-    largest_closing_speed,
-    largest_peak_force,
-    repeated_collisions,
-    struck_standing,
+    largest_impact_force,
+    largest_impact_impulse,
+    push_duration,
+    push_impulse,
+    shoved_standing,
+    time_shoved_standing,
     wedged_collisions,
 )
 from socialnav_mj.metrics.kinematics import (
@@ -89,7 +91,8 @@ __all__ = [
     "intimate_intrusions",
     "intrusion_share",
     "largest_closing_speed",
-    "largest_peak_force",
+    "largest_impact_force",
+    "largest_impact_impulse",
     "maximum_acceleration",
     "maximum_jerk",
     "maximum_speed",
@@ -105,7 +108,10 @@ __all__ = [
     "path_irregularity",
     "path_length",
     "per_agent",
+    "push_duration",
+    "push_impulse",
     "repeated_collisions",
+    "shoved_standing",
     "social_work",
     "space_compliance",
     "spawn_delay",
@@ -113,6 +119,7 @@ __all__ = [
     "struck_standing",
     "success",
     "time_not_moving",
+    "time_shoved_standing",
     "time_under_way",
     "timed_out",
     "wedged_collisions",

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.episode import Episode, Partner
+from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.metric import Better, Kind, Mean, Metric, Need
 from socialnav_mj.metrics.missing import NEVER
 
@@ -61,6 +62,36 @@ def counted_contacts(episode: Episode) -> NDArray[np.bool_]:
         True for those that count, shape (k,).
     """
     return episode.contact_time <= episode.agent_end_time[episode.contact_agent] + _SAME_TIME
+
+
+def number_of(episode: Episode, which: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Number of an agent's collisions of some kind.
+
+    Args:
+        episode: Record with k contacts.
+        which: Contacts of that kind, shape (k,).
+
+    Returns:
+        Shape (n_agents,).
+    """
+    counted = counted_contacts(episode) & which
+    return np.bincount(episode.contact_agent[counted], minlength=episode.n_agents).astype(np.int64)
+
+
+def largest_of(episode: Episode, values: Array) -> Array:
+    """Largest value of an agent's collisions.
+
+    Args:
+        episode: Record with k contacts.
+        values: Shape (k,); NaN for those that are left out.
+
+    Returns:
+        Shape (n_agents,); NaN for agents without a collision that has a value.
+    """
+    counted = counted_contacts(episode)
+    result = np.full(episode.n_agents, np.nan)
+    np.fmax.at(result, episode.contact_agent[counted], values[counted])
+    return result
 
 
 METRICS = (

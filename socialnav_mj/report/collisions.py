@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from socialnav_mj.contact import FORCE_COLUMNS
 from socialnav_mj.episode import Episode, Partner
 from socialnav_mj.metrics.collisions import counted_contacts
 from socialnav_mj.metrics.contacts import (
@@ -16,7 +17,8 @@ from socialnav_mj.metrics.contacts import (
     partner_person,
     standing,
 )
-from socialnav_mj.metrics.severity import Severity, flesh_force, severity, wedged
+from socialnav_mj.metrics.forces import shoved
+from socialnav_mj.metrics.severity import Severity, clamped, flesh_force, impact_momentum, severity, wedged
 
 CONTACT_SCHEMA = pa.schema(
     [
@@ -38,9 +40,16 @@ CONTACT_SCHEMA = pa.schema(
         ("closing_speed", pa.float64()),
         ("bearing", pa.float64()),
         ("duration", pa.float64()),
-        ("impulse", pa.float64()),
-        ("peak_force", pa.float64()),
+        ("impact_impulse", pa.float64()),
+        ("impact_momentum", pa.float64()),
+        ("impact_force", pa.float64()),
+        ("shoved", pa.bool_()),
+        ("push_duration", pa.float64()),
+        ("push_impulse", pa.float64()),
+        ("push_force", pa.float64()),
+        ("peak_time", pa.float64()),
         ("squeeze", pa.float64()),
+        ("clamped", pa.bool_()),
         ("wedged", pa.bool_()),
         ("severity", pa.string()),
         ("flesh_force", pa.float64()),
@@ -80,11 +89,12 @@ def contacts_table(episode: Episode, *, labels: dict[str, Any], file: str = "") 
         "closing_speed": episode.contact_closing_speed,
         "bearing": bearing(episode),
         "duration": episode.contact_duration,
-        "impulse": episode.contact_impulse,
-        "peak_force": episode.contact_peak_force,
-        "squeeze": episode.contact_squeeze,
+        "impact_momentum": impact_momentum(episode),
+        **{name: getattr(episode, f"contact_{name}") for name in FORCE_COLUMNS},
+        "clamped": clamped(episode),
+        "shoved": shoved(episode),
         "wedged": wedged(episode),
-        "severity": _names(Severity, severity(episode, episode.contact_peak_force)),
+        "severity": _names(Severity, severity(episode, episode.contact_impact_force)),
         "flesh_force": flesh,
         "flesh_severity": _names(Severity, severity(episode, flesh)),
     }

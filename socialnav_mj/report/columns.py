@@ -110,7 +110,12 @@ ORDER = (
     "repeated_collisions",
     STRUCK_STANDING,
     "largest_closing_speed",
-    "largest_peak_force",
+    "largest_impact_force",
+    "largest_impact_impulse",
+    "push_duration",
+    "push_impulse",
+    "shoved_standing",
+    "time_shoved_standing",
 )
 """Places that metrics and measures keep, so that tables of before and after can be laid side by side."""
 

@@ -30,9 +30,12 @@ pedestrian's as counts for a collision above."""
 
 _SEVERITY = """\
 Collisions with people against ISO/TS 15066's limits for the lower leg, where the bumper strikes: 130 N, or 260 N for \
-at most 0.5 s. *Simulated*: peak force of the contact in MuJoCo, in which a pedestrian is infinitely heavy and \
-softer than flesh; *flesh*: the specification's own estimate from the closing speed for a free 8 kg robot, without \
-padding. *Clamped*: the robot touched two bodies at once; its force means nothing. See docs/metrics.md.
+at most 0.5 s. *Impact*: the first 0.1 s after the first touch; *expected*: the momentum that two free bodies exchange \
+at the closing speed. *Simulated*: the impact's largest force in MuJoCo, softer than flesh, and the mean force of the \
+push after it; *flesh*: the specification's own estimate from the closing speed for a free robot, without padding. \
+*Clamped*: the robot touched two bodies during the impact; its force means nothing. *Pushed*: time in touch after the \
+impact, mean over collisions. *Shoved standing*: collisions that struck an agent standing still and pushed it for 1 s \
+or longer. See docs/metrics.md.
 """
 
 _PAIRED = """\
@@ -93,20 +96,25 @@ def severity_section(contacts: pa.Table) -> list[str]:
     Returns:
         Lines of Markdown; none without a collision under physics.
     """
-    headings = ["scenario", "controller", "collisions", "closing speed [m/s]: median", "95 %", "impulse [N s]: median"]
+    headings = ["scenario", "controller", "collisions", "closing speed [m/s]: median", "95 %"]
+    headings += ["impact [N s]: median", "expected", "pushed [s]", "shoved standing"]
     headings += ["simulated: to 130 N", "to 260 N", "over", "clamped", "flesh: to 130 N", "to 260 N", "over"]
     rows: Rows = []
     for labels, columns, _ in groups(contacts):
         hit = columns["partner"] == "pedestrian"
-        if not hit.any() or np.isnan(columns["peak_force"][hit]).all():
+        if not hit.any() or np.isnan(columns["impact_force"][hit]).all():
             continue
         speed = np.percentile(columns["closing_speed"][hit], [50, 95])
         free = hit & (columns["severity"] != "clamped")
-        impulse = f"{np.median(columns['impulse'][free]):.1f}" if free.any() else "-"
+        medians = [
+            f"{np.median(columns[name][free]):.1f}" if free.any() else "-"
+            for name in ("impact_impulse", "impact_momentum")
+        ]
+        pushed = [f"{np.mean(columns['push_duration'][hit]):.2f}", str(int(np.sum(columns["shoved"][hit])))]
         classes = [member.name.lower() for member in Severity]
         simulated = [str(int(np.sum(columns["severity"][hit] == name))) for name in classes]
         flesh = [str(int(np.sum(columns["flesh_severity"][hit] == name))) for name in classes[:3]]
-        cells = [str(int(hit.sum())), *(f"{value:.2f}" for value in speed), impulse, *simulated, *flesh]
+        cells = [str(int(hit.sum())), *(f"{value:.2f}" for value in speed), *medians, *pushed, *simulated, *flesh]
         rows.append([_place(labels), labels["controller"], *cells])
     return ["## How hard", "", _SEVERITY, *table(headings, rows)] if rows else []
 

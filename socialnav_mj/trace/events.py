@@ -4,7 +4,7 @@ import numpy as np
 
 from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
 from socialnav_mj.metrics.contacts import partner_person
-from socialnav_mj.metrics.severity import wedged
+from socialnav_mj.metrics.severity import clamped, wedged
 
 
 def touch_rows(episode: Episode) -> IntArray:
@@ -35,22 +35,21 @@ def partner_words(episode: Episode, rows: IntArray) -> list[str]:
 
 
 def severities(episode: Episode, rows: IntArray) -> list[str]:
-    """Closing speed and peak force, the latter where it means something.
+    """Closing speed and force of the impact, the latter where it means something.
 
     Args:
         episode: Whose contacts the rows are.
         rows: (k,) contact rows.
 
     Returns:
-        k texts such as "0.82 m/s, 154 N", "0.82 m/s, wedged", or "0.82 m/s" where there was no physics.
+        k texts such as "0.82 m/s, 154 N", "0.82 m/s, wedged", "0.82 m/s, clamped", or "0.82 m/s" where there was no
+        physics.
     """
-    speeds, forces = episode.contact_closing_speed[rows].tolist(), episode.contact_peak_force[rows].tolist()
-    told = [f", {force:.0f} N" if np.isfinite(force) else "" for force in forces]
-    held = wedged(episode)[rows].tolist()
-    return [
-        f"{speed:.2f} m/s" + (", wedged" if without else force)
-        for speed, force, without in zip(speeds, told, held, strict=True)
-    ]
+    speeds, forces = episode.contact_closing_speed[rows].tolist(), episode.contact_impact_force[rows].tolist()
+    told = [f"{force:.0f} N" for force in forces]
+    without = [np.isnan(forces), wedged(episode)[rows], clamped(episode)[rows]]
+    words = np.select(without, ["", "wedged", "clamped"], told)
+    return [f"{speed:.2f} m/s" + (f", {word}" if word else "") for speed, word in zip(speeds, words, strict=True)]
 
 
 def events(episode: Episode) -> list[tuple[float, str, str]]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from socialnav_mj.episode import Episode, IntArray, Partner
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.contacts import partner_person
+from socialnav_mj.metrics.severity import clamped, wedged
 from socialnav_mj.trace import layout as look
 from socialnav_mj.trace.events import partner_words, severities, touch_rows
 from socialnav_mj.trace.lanes import first_touch_time
@@ -134,8 +135,7 @@ def _touches(episode: Episode, sink: Sink) -> None:
             "partner_kind": partner_words(episode, rows),
             "partner": partner_person(episode, rows),
             "closing_speed": closing,
-            "impulse": episode.contact_impulse[rows],
-            "peak_force": episode.contact_peak_force[rows],
+            **_forces(episode, rows),
             "squeeze": episode.contact_squeeze[rows],
             "duration": episode.contact_duration[rows],
         },
@@ -146,6 +146,20 @@ def _touches(episode: Episode, sink: Sink) -> None:
     sink.static("/scene/touches/all", rr.Points3D.from_fields(colors=look.VERMILION))
     small = rr.Points3D.columns(positions=_in_space(episode.contact_position[rows], 0.0), radii=0.4 * radii)
     sink.columns("/scene/touches/all", episode.contact_time[rows], small, details)
+
+
+def _forces(episode: Episode, rows: IntArray) -> dict[str, Array]:
+    """Impact and push of touches; NaN where the robot was held between two bodies, so that they mean nothing."""
+    held = wedged(episode)
+    meaningless = {"impact": clamped(episode) | held, "push": held}
+    return {
+        name: np.where(meaningless[phase], np.nan, getattr(episode, f"contact_{name}"))[rows]
+        for phase, names in (
+            ("impact", ("impact_impulse", "impact_force")),
+            ("push", ("push_impulse", "push_duration")),
+        )
+        for name in names
+    }
 
 
 def _in_space(position: Array, height: float) -> NDArray[np.float32]:

@@ -1,0 +1,135 @@
+"""The table of forces in docs/metrics.md: a walker goes into a standing robot, from three sides at three speeds.
+
+`python tests/forces.py` writes it. The robot stands with its brakes on; the walker keeps its speed for `DURATION`.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from socialnav_mj.config import Scenario
+from socialnav_mj.contact import IMPACT_DURATION
+from socialnav_mj.geometry import quaternion_of_yaw
+from socialnav_mj.metrics.severity import ROBOT_MASS, reduced_mass
+from socialnav_mj.physics import Physics
+from socialnav_mj.report.markdown import table
+from socialnav_mj.scene import build_model
+from socialnav_mj.touch import Touch
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "metrics.md"
+BEGIN, END = "<!-- Made by `python tests/forces.py`. -->\n", "<!-- End of what it makes. -->"
+
+SIDES = {"front": np.pi, "side": 0.5 * np.pi, "behind": 0.0}
+"""Heading of the robot, towards which somebody walks along +x [rad]."""
+SPEEDS = (0.5, 1.0, 1.5)
+"""Of the walker [m/s]."""
+DURATION = 4.0
+"""Of the walk, from 0.05 m before the touch on [s]."""
+TYRE_FRICTION, GRAVITY = 0.8, 9.81
+"""assets/robot.xml; arena.xml [m/s^2]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A walker into a standing robot."""
+
+    side: str
+    speed: float
+    """[m/s]"""
+    touch: Touch
+    """What the physics made of it."""
+
+    @property
+    def impulse(self) -> float:
+        """Over all of the contact [N s]."""
+        return self.touch.impact_impulse + self.touch.push_impulse
+
+    @property
+    def peak_force(self) -> float:
+        """Of all of the contact [N]."""
+        return max(self.touch.impact_force, self.touch.push_force)
+
+    @property
+    def grip(self) -> float:
+        """What the tyres hold against a push across the wheels, in the time of the impact at most [N s]."""
+        across = abs(np.sin(SIDES[self.side]))
+        return float(across * TYRE_FRICTION * ROBOT_MASS * GRAVITY * IMPACT_DURATION)
+
+    @property
+    def estimate(self) -> float:
+        """Momentum that two free bodies exchange, and the tyres' grip [N s]."""
+        # Whoever walks along +x strikes the robot at the opposite of its heading.
+        bearing = np.pi - SIDES[self.side]
+        return float(self.speed * reduced_mass(np.array([bearing]))[0]) + self.grip
+
+
+def run(side: str, speed: float, *, physics_timestep: float = 0.01) -> Case:
+    """Walk into a robot that stands.
+
+    Args:
+        side: Of `SIDES`.
+        speed: [m/s].
+        physics_timestep: [s].
+
+    Returns:
+        The case with its only touch.
+    """
+    scenario = Scenario(physics_timestep=physics_timestep)
+    bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
+    physics = Physics.from_mujoco(build_model(scenario, n_agent_slots=1, n_pedestrian_slots=1, **bounds))
+    with physics.reset_context():
+        physics.place_agent(0, np.zeros(2), SIDES[side])
+    physics.step(round(0.5 / physics_timestep))  # the wheels sink in
+    start, walker = -(scenario.contact_distance + 0.05), np.array([0])
+    steps = round(DURATION / physics_timestep)
+    path = np.zeros((steps, 1, 2))
+    path[:, 0, 0] = start + speed * physics_timestep * np.arange(steps)
+    velocity = np.zeros_like(path)
+    velocity[..., 0] = speed
+    physics.set_pedestrian_pose(walker, path[0], quaternion_of_yaw(np.zeros(1)))
+    physics.set_pedestrian_contacts(walker, np.ones(1, dtype=bool))
+    physics.set_pedestrian_path(path, velocity)
+    physics.step(steps)
+    (touch,) = physics.new_touches()
+    return Case(side=side, speed=speed, touch=touch)
+
+
+def cases() -> list[Case]:
+    """All sides and speeds."""
+    return [run(side, speed) for side in SIDES for speed in SPEEDS]
+
+
+def force_table() -> str:
+    """The table of docs/metrics.md."""
+    headings = ["from", "walker [m/s]", "whole contact: impulse [N s]", "peak [N]", "at [s]"]
+    headings += ["impact: impulse [N s]", "estimate", "ratio", "largest force [N]", "push: time [s]", "impulse [N s]"]
+    rows = [
+        [
+            case.side,
+            f"{case.speed:.1f}",
+            f"{case.impulse:.0f}",
+            f"{case.peak_force:.0f}",
+            f"{case.touch.peak_time:.2f}",
+            f"{case.touch.impact_impulse:.1f}",
+            f"{case.estimate:.1f}",
+            f"{case.touch.impact_impulse / case.estimate:.2f}",
+            f"{case.touch.impact_force:.0f}",
+            f"{case.touch.push_duration:.1f}",
+            f"{case.touch.push_impulse:.0f}",
+        ]
+        for case in cases()
+    ]
+    return "\n".join(table(headings, rows))
+
+
+def with_table(page: str) -> str:
+    """The page with the table of today between its marks."""
+    before, _, rest = page.partition(BEGIN)
+    return f"{before}{BEGIN}\n{force_table()}\n{END}{rest.partition(END)[2]}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    sys.stdout.write(force_table())

@@ -1,0 +1,39 @@
+"""Forces of a walker who goes into a standing robot, beside the momentum that two bodies exchange."""
+
+import pytest
+from forces import PAGE, SIDES, SPEEDS, Case, cases, run, with_table
+
+
+@pytest.fixture(scope="module")
+def found() -> list[Case]:
+    return cases()
+
+
+def test_impact_has_the_two_body_impulse_within_a_factor_of_one_and_a_half(found: list[Case]) -> None:
+    assert [(case.side, case.speed) for case in found] == [(side, speed) for side in SIDES for speed in SPEEDS]
+    for case in found:
+        assert 1 / 1.5 < case.touch.impact_impulse / case.estimate < 1.5, (case.side, case.speed)
+
+
+def test_whole_contact_has_many_times_the_impulse_and_sideways_a_peak_that_comes_late(found: list[Case]) -> None:
+    """Why the impact is told by itself."""
+    assert all(case.impulse > 8.0 * case.estimate for case in found)
+    assert all((case.touch.peak_time > 1.0) is (case.side == "side") for case in found)
+    assert all(case.touch.push_duration > 3.5 for case in found)
+
+
+def test_shove_is_the_motors_force_along_the_wheels_and_the_tyres_grip_across(found: list[Case]) -> None:
+    for case in found:
+        mean = case.touch.push_impulse / case.touch.push_duration
+        assert mean == pytest.approx(32.0, rel=0.1) if case.side != "side" else 60.0 < mean < 85.0
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_impact_hardly_depends_on_the_physics_step(side: str) -> None:
+    fine = run(side, 1.0, physics_timestep=0.0025)
+    assert fine.touch.impact_impulse == pytest.approx(run(side, 1.0).touch.impact_impulse, rel=0.2)
+
+
+def test_page_shows_the_table_of_today() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert page == with_table(page), "docs/metrics.md is not up to date: `python tests/forces.py`"
