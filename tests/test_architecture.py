@@ -48,8 +48,9 @@ ONLY_IN = {
     "torch": {"learning"},
     "stable_baselines3": {"learning"},
     "gymnasium": {"learning"},
+    "numba": {"controllers"},
 }
-LAZY = ("torch", "rerun", "stable_baselines3", "gymnasium", "matplotlib", "pyarrow")
+LAZY = ("torch", "rerun", "stable_baselines3", "gymnasium", "matplotlib", "pyarrow", "numba")
 
 # sha256 of the UCY files that may not travel with the project: annotations, homographies, groups.
 UCY_SUMS = {

@@ -12,7 +12,7 @@ from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
-from socialnav_mj.cli.studies import LeaveOneOut, Reproduce, Ship, Train
+from socialnav_mj.cli.studies import FitPrediction, LeaveOneOut, Reproduce, Ship, Train
 from socialnav_mj.processes import stoppable
 
 Command = (
@@ -25,6 +25,7 @@ Command = (
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Ship, tyro.conf.subcommand("ship")]
+    | Annotated[FitPrediction, tyro.conf.subcommand("fit-prediction")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
 )

@@ -1,4 +1,4 @@
-"""The sub-commands of many runs: `train`, `ship`, `reproduce` and `leave-one-out`."""
+"""The sub-commands of learning and of many runs: `train`, `ship`, `fit-prediction`, `reproduce`, `leave-one-out`."""
 
 import shlex
 import sys
@@ -77,6 +77,31 @@ class Ship:
 
         for path in ship(self.folders, self.out or policies_folder()):
             say(f"policy: {path}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitPrediction:
+    """Fit where people will be, a linear function of their last velocities, to recordings; controllers plan with it."""
+
+    datasets: tuple[str, ...] = ("zara01", "zara02")
+    """Recordings to learn from, two or more: names in the catalogue, or paths."""
+    judged_on: tuple[str, ...] = ()
+    """Recordings on which it is judged besides."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    out: Path = Path("linear.json")
+    """File to write."""
+
+    def run(self) -> None:
+        """Fit, write the file, and print how far predictions err on recordings that they did not learn from."""
+        from socialnav_mj.learning.prediction import fit_prediction
+
+        data_dir = None if self.data_dir is None else str(self.data_dir)
+        card = fit_prediction(self.datasets, self.out, judged_on=self.judged_on, data_dir=data_dir)
+        for name, own in card["held_out_error"].items():
+            linear, plain = own["linear"][15], own["constant_velocity"][15]
+            say(f"{name}: mean displacement error after 3.2 s {linear:.3f} m, constant velocity {plain:.3f} m")
+        say(f"prediction: {self.out}\nuse it: --controllers \"mpc(prediction='{self.out}')\"")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ from typing import Any
 from socialnav_mj.controllers.base import IS_CONTROLLER, Controller
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
+from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
 
@@ -22,6 +23,7 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "replay_irl": ReplayIRL,
     "hybrid": Hybrid,
     "go_straight": GoStraight,
+    "mpc": MPC,
 }
 
 

@@ -1,0 +1,93 @@
+"""What plans cost, computed with numpy arrays: the definition that the compiled loops are held to, bit by bit."""
+
+import numpy as np
+
+from socialnav_mj.controllers.planning.loops import (
+    bearing,
+    closest,
+    inside,
+    lacking,
+    sine_cosine,
+    small_sine_cosine,
+    speed_gained,
+    turn_made,
+    yaw_command,
+)
+from socialnav_mj.controllers.planning.terms import Crowd, Terms
+from socialnav_mj.geometry import Array
+
+
+def plan_costs(
+    plans: Array, speed: Array, yaw_rate: Array, goal: Array, crowd: Crowd, terms: Terms
+) -> tuple[Array, Array]:
+    """Cost of each plan of each agent, rolled out in the agent's frame.
+
+    A plan heads for psi_1 at speed v_1 until t_1, then for the goal's bearing plus psi_2 at v_2. Its cost is the time
+    to the goal, or the horizon with what is left of the way at full speed and a little for not facing the goal; half
+    the sum and half the maximum, over others, of the worst lack of clearance; and the time that each person is in the
+    zone.
+
+    Args:
+        plans: (n, p, 5) psi_1 [rad], v_1 [m/s], t_1 [s], psi_2 [rad], v_2 [m/s].
+        speed: (n,) measured [m/s].
+        yaw_rate: (n,) measured [rad/s].
+        goal: (n, 2) [m].
+        crowd: Around each agent, for as many steps as there are terms.
+        terms: Limits, motion and shapes of the costs.
+
+    Returns:
+        Cost, and the part of it that is for clearance, both (n, p) [s].
+    """
+    psi_1, v_1, t_1, psi_2, v_2 = np.moveaxis(plans, 2, 0)
+    first_y, first_x = sine_cosine(psi_1)
+    offset_y, offset_x = sine_cosine(psi_2)
+    shape = psi_1.shape
+    x, y, cosine, sine = np.zeros(shape), np.zeros(shape), np.ones(shape), np.zeros(shape)
+    v, w = np.broadcast_to(speed[:, None], shape), np.broadcast_to(yaw_rate[:, None], shape)
+    to_x, to_y = np.broadcast_to(goal[:, :1], shape), np.broadcast_to(goal[:, 1:], shape)
+    time, within, remaining = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    under_way = np.ones(shape, dtype=bool)
+    worst = np.zeros((*shape, crowd.contact.shape[1]))
+    for k in range(len(terms.margin)):
+        first = k * terms.step < t_1
+        head_x = np.where(first, first_x, offset_x * to_x - offset_y * to_y)
+        head_y = np.where(first, first_y, offset_x * to_y + offset_y * to_x)
+        error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
+        command = yaw_command(error, terms)
+        half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(command, w, terms))
+        w = command
+        gained = speed_gained(np.where(first, v_1, v_2), v, terms)
+        way = (v + terms.mean_speed * gained) * terms.step
+        v = v + gained
+        cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine
+        next_x, next_y = x + way * cosine, y + way * sine
+        cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine
+        distance = closest(
+            crowd.x[:, None, k] - x[..., None],
+            crowd.y[:, None, k] - y[..., None],
+            crowd.x[:, None, k + 1] - next_x[..., None],
+            crowd.y[:, None, k + 1] - next_y[..., None],
+        )
+        lack = terms.clearance_decay[k] * lacking(distance, crowd.contact[:, None], terms.margin[k], terms)
+        counted = np.maximum(worst, crowd.clearance_weight[:, None] * lack)
+        worst = np.where(under_way[..., None], counted, worst)
+        weighted = _sum(crowd.zone_weight[:, None] * inside(distance, terms))
+        within = np.where(under_way, within + weighted * terms.zone_time[k], within)
+        x, y = next_x, next_y
+        to_x, to_y = goal[:, :1] - x, goal[:, 1:] - y
+        time = np.where(under_way, (k + 1) * terms.step, time)
+        remaining = np.where(under_way, np.sqrt(to_x * to_x + to_y * to_y), remaining)
+        under_way = under_way & (remaining > terms.arrival_distance)
+    error = bearing(cosine * to_y - sine * to_x, cosine * to_x + sine * to_y)
+    facing = np.where(under_way, terms.heading_weight * np.abs(error), 0.0)
+    clearance = 0.5 * (_sum(worst) + worst.max(axis=2, initial=0.0))
+    cost = time + (remaining - terms.arrival_distance) / terms.max_speed + facing + clearance + within
+    return cost, clearance
+
+
+def _sum(values: Array) -> Array:
+    """Over the last axis, from its beginning: numpy's own sum adds in an order that depends on the count."""
+    total = np.zeros(values.shape[:-1])
+    for j in range(values.shape[-1]):
+        total = total + values[..., j]
+    return total

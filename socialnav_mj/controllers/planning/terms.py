@@ -1,0 +1,116 @@
+"""What a plan is judged by: the crowd around an agent, the robot's limits and motion, and the shapes of the costs."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from socialnav_mj.controllers.base import Limits
+from socialnav_mj.controllers.prediction import STEP
+from socialnav_mj.elementary import exp
+from socialnav_mj.geometry import Array
+
+# The robot's motion in 0.2 s, fitted to assets/robot.xml; `tests/test_planning.py` holds roll-outs beside the physics.
+SPEED_RESPONSE = 0.725
+"""Share of a commanded change of speed that is made in 0.2 s [1]."""
+SPEED_CHANGE = 0.49
+"""The largest change of speed in 0.2 s [m/s]."""
+MEAN_SPEED = 0.55
+"""Share of a step's change of speed that its mean speed has [1]."""
+YAW_ACCELERATION = 29.7
+"""With which a commanded yaw rate is reached [rad/s^2]."""
+YAW_DELAY = 0.005
+"""After which it is [s]."""
+
+# The shapes of the costs: chosen on draws 0-9 of students003.
+MARGIN = 0.23
+"""Clearance beyond contact that is free of cost now [m]."""
+MARGIN_GROWTH = 0.12
+"""By which that grows with the time ahead: predictions err [m/s]."""
+OVERLAP = 0.02
+"""So far inside of contact the clearance cost reaches its weight [m]."""
+MOST_LACKING = 2.0
+"""Where lacking clearance ends to count, as a multiple of that to `OVERLAP` [1]."""
+CLEARANCE_TIME = 2.0
+"""Over which the clearance cost decays with the time ahead to 1/e [s]."""
+ZONE = 1.3
+"""Distance to a person below which time costs: what is reported is 1.2 m [m]."""
+ZONE_WIDTH = 0.3
+"""Over which that cost rises from 0 to its weight [m]."""
+ZONE_TIME = 4.0
+"""Over which it decays to 1/e [s]."""
+HEADING_WEIGHT = 0.15
+"""Cost of not facing the goal at the end of the horizon [s/rad]."""
+ARRIVAL_DISTANCE = 0.5
+"""From the goal, where a roll-out ends: `Scenario.goal_radius` [m]."""
+
+
+class Crowd(NamedTuple):
+    """Who is around each of n agents, in its frame; k places a row, weights 0 in empty ones."""
+
+    x: Array
+    """(n, steps + 1, k) ahead, now and at the end of each step [m]."""
+    y: Array
+    """(n, steps + 1, k) to the left, the same [m]."""
+    contact: Array
+    """(n, k) distance between the centres at which they touch [m]."""
+    clearance_weight: Array
+    """(n, k) cost of touching now [s]."""
+    zone_weight: Array
+    """(n, k) cost of a second within the zone [1]."""
+
+
+class Terms(NamedTuple):
+    """What roll-outs of one episode share; see this module's constants."""
+
+    step: float
+    max_speed: float
+    max_yaw_rate: float
+    speed_response: float
+    speed_change: float
+    mean_speed: float
+    yaw_acceleration: float
+    yaw_delay: float
+    margin: Array
+    """(steps,) free clearance at each step [m]."""
+    overlap: float
+    most_lacking: float
+    clearance_decay: Array
+    """(steps,) by which clearance counts [1]."""
+    zone: float
+    zone_width: float
+    zone_time: Array
+    """(steps,) by which a step in the zone counts [s]."""
+    heading_weight: float
+    arrival_distance: float
+
+
+def terms_of(limits: Limits, *, steps: int) -> Terms:
+    """Terms for robots with some limits.
+
+    Args:
+        limits: Of the episode.
+        steps: How many steps of `prediction.STEP` a roll-out has.
+
+    Returns:
+        With this module's constants.
+    """
+    ahead: Array = STEP * np.arange(steps, dtype=float)
+    return Terms(
+        step=STEP,
+        max_speed=limits.max_speed,
+        max_yaw_rate=limits.max_yaw_rate,
+        speed_response=SPEED_RESPONSE,
+        speed_change=SPEED_CHANGE,
+        mean_speed=MEAN_SPEED,
+        yaw_acceleration=YAW_ACCELERATION,
+        yaw_delay=YAW_DELAY,
+        margin=MARGIN + MARGIN_GROWTH * ahead,
+        overlap=OVERLAP,
+        most_lacking=MOST_LACKING,
+        clearance_decay=exp(-ahead / CLEARANCE_TIME),
+        zone=ZONE,
+        zone_width=ZONE_WIDTH,
+        zone_time=STEP * exp(-ahead / ZONE_TIME),
+        heading_weight=HEADING_WEIGHT,
+        arrival_distance=ARRIVAL_DISTANCE,
+    )
