@@ -30,6 +30,7 @@ ROWS = (
     {"learning"},
     {"studies"},
     {"studies.paper", "studies.leave_one_out"},
+    {"studies.gains"},
     {"benchmark", "resimulation", "verification", "cli"},
 )
 # A study uses what all studies share, and no other study.
@@ -43,7 +44,7 @@ EXCEPTIONS = {("socialnav_mj", "tasks")}
 ONLY_IN = {
     "mujoco": {"scene", "scene_index", "touch", "physics", "task", "environment", "tasks", "benchmark"},
     "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "benchmark", "cli", "socialnav_mj"},
-    "matplotlib": {"report", "studies.paper"},
+    "matplotlib": {"report", "studies.paper", "studies.gains"},
     "rerun": {"trace"},
     "torch": {"learning"},
     "stable_baselines3": {"learning"},

@@ -9,12 +9,12 @@ from agents import METHOD_VALUES, experiment_table, roster_of, rows_of, table_of
 
 from socialnav_mj.recordings import Recording
 from socialnav_mj.studies import intervals
+from socialnav_mj.studies.claims import CLAIMS
+from socialnav_mj.studies.findings import examine, verdict_of, verdict_of_all
 from socialnav_mj.studies.held_out import HELD_OUT, IN_SAMPLE, VALIDATION, period_of_people
 from socialnav_mj.studies.intervals import two_way_interval
 from socialnav_mj.studies.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry, Term, make_panel
-from socialnav_mj.studies.paper.claims import CLAIMS
 from socialnav_mj.studies.paper.claims_page import claims_page
-from socialnav_mj.studies.paper.findings import examine, verdict_of, verdict_of_all
 
 SEEDS = (0, 1, 2)
 

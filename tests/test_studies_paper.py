@@ -16,8 +16,8 @@ from socialnav_mj.episode import EpisodeError
 from socialnav_mj.report import style
 from socialnav_mj.report.agents import Results
 from socialnav_mj.studies import intervals
+from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.files import publish
-from socialnav_mj.studies.paper.claims import CLAIMS
 from socialnav_mj.studies.paper.outputs import PUBLIC, agents_of, write_outputs
 from socialnav_mj.studies.paper.plan import DEFAULT, SWEEP, VARIANTS, Experiment, shipped_for
 from socialnav_mj.studies.study import read_runs, reproduce, run_folder

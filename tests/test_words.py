@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.looks import LOOKS
 from socialnav_mj.studies.panel import METHODS, MIXED
-from socialnav_mj.studies.paper.claims import CLAIMS
 
 PACKAGE = Path(__file__).parent.parent / "socialnav_mj"
 SHOWN = sorted(

@@ -12,7 +12,7 @@ from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
-from socialnav_mj.cli.studies import FitPrediction, LeaveOneOut, Reproduce, Ship, Train
+from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce, Ship, Train
 from socialnav_mj.processes import stoppable
 
 Command = (
@@ -28,6 +28,7 @@ Command = (
     | Annotated[FitPrediction, tyro.conf.subcommand("fit-prediction")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
+    | Annotated[Gains, tyro.conf.subcommand("gains")]
 )
 
 

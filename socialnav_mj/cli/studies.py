@@ -216,3 +216,57 @@ class LeaveOneOut:
         say(f"report: {page}")
         if self.publish is not None:
             say(f"to be committed: {publish(self.out, self.publish, leave_one_out.PUBLIC)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """Run both potential fields over the ranges of their gains, beside the learned controllers, on draws for choosing.
+
+    Writes a figure, tables and a page: where each form stands in its own range, and which claims of the paper about the
+    potential field depend on its gains. If a run is interrupted, repeat the command to resume it.
+    """
+
+    recordings: tuple[str, ...] = ("students003", "zara01")
+    """Names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    policies: tuple[str, ...] = ()
+    """Names of shipped policies, or paths of .safetensors files; the first three of students003 by default."""
+    settings: int = 40
+    """Gains drawn for each form, beside the default ones."""
+    scenarios: Scenarios = (1, 2, 3, 4)
+    """Scenarios to run."""
+    draws: int = 2
+    """Random choices of the replaced people."""
+    seed: int = 0
+    """Seed of the first draw; the others count up from it, those below 100 are for choosing."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path = Path("gains")
+    """Folder of the results."""
+    publish: Folder = None
+    """Folder that gets a copy of tables, figure and page: all that holds no recording and no episode."""
+
+    def run(self) -> None:
+        """Run what is missing behind a bar, then write tables, figure and page, and copy them if asked to."""
+        from socialnav_mj.studies.files import publish
+        from socialnav_mj.studies.gains.study import PUBLIC, GainSweep, write_gain_sweep
+        from socialnav_mj.studies.paper.plan import shipped_for
+        from socialnav_mj.studies.study import reproduce
+
+        study = GainSweep(
+            recordings=self.recordings,
+            policies=self.policies or shipped_for("students003")[:3],
+            settings=self.settings,
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            draws=self.draws,
+            seed=self.seed,
+        )
+        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
+        follow(reproduce(study, self.out, command=command, n_jobs=self.jobs), study.jobs())
+        with errors.status("tables and figure"):
+            page = write_gain_sweep(study, self.out, command=command, n_jobs=self.jobs)
+        say(f"report: {page}")
+        if self.publish is not None:
+            say(f"to be committed: {publish(self.out, self.publish, PUBLIC)}")

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 
 from socialnav_mj.report.markdown import bounds, head, row
+from socialnav_mj.studies.claims import COMPARABLE, Part
+from socialnav_mj.studies.findings import Finding, Verdict
 from socialnav_mj.studies.intervals import Interval
-from socialnav_mj.studies.paper.claims import COMPARABLE, Part
-from socialnav_mj.studies.paper.findings import Finding, Verdict
 
 _RULE = f"""\
 - A claim is a list of comparisons, each a mean difference turned so that the claim says "greater than 0".

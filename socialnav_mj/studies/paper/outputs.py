@@ -15,12 +15,12 @@ from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.studies.files import level_rows, provenance_of, write_csv
+from socialnav_mj.studies.findings import Finding, examine
 from socialnav_mj.studies.held_out import held_out_levels, period_of_people
 from socialnav_mj.studies.levels import Level, LevelTable, levels
 from socialnav_mj.studies.panel import MIXED, make_panel
 from socialnav_mj.studies.paper.claims_page import claims_page
 from socialnav_mj.studies.paper.figures import draw_figures, draw_sweep
-from socialnav_mj.studies.paper.findings import Finding, examine
 from socialnav_mj.studies.paper.page import experiment_page
 from socialnav_mj.studies.paper.plan import (
     DEFAULT,

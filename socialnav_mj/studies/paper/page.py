@@ -6,11 +6,11 @@ from typing import Any
 from socialnav_mj.report.markdown import head, row
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.files import traceability
+from socialnav_mj.studies.findings import Finding
 from socialnav_mj.studies.levels import Level, LevelTable
 from socialnav_mj.studies.looks import LOOKS, SCENARIO_TITLES
 from socialnav_mj.studies.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
 from socialnav_mj.studies.paper.figures import FIGURES
-from socialnav_mj.studies.paper.findings import Finding
 from socialnav_mj.studies.paper.plan import DEFAULT
 from socialnav_mj.studies.paper.training_curves import training_table
 

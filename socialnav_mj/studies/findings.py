@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from socialnav_mj.studies.claims import CLAIMS, Claim, Part
 from socialnav_mj.studies.intervals import Interval, two_way_interval
 from socialnav_mj.studies.panel import Panel
-from socialnav_mj.studies.paper.claims import CLAIMS, Claim, Part
 
 Verdict = Literal["holds", "fails", "undecided"]
 
