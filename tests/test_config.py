@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from socialnav_mj.config import PEDESTRIAN_RADII, ROBOT_RADII, Robot, Scenario
+from socialnav_mj.config import MIN_CONTACT_DISTANCE, PEDESTRIAN_RADII, ROBOT_RADII, Robot, Scenario
 
 
 def test_figures_that_follow_from_the_defaults_are_those_of_the_design() -> None:
@@ -65,6 +65,7 @@ def test_configuration_cannot_be_changed() -> None:
         ("on_collision", "stop", "continue, retire"),
         ("pedestrian_radius", 0.0, r"numbers in \[0\.05, 0\.4\]"),
         ("pedestrian_radius", 0.41, r"numbers in \[0\.05, 0\.4\]"),
+        ("pedestrian_radius", 0.079, r"at least 0\.08 with Robot\.radius = 0\.17, or people walk through robots"),
         ("goal_radius", float("inf"), "numbers > 0"),
         ("physics_timestep", None, r"numbers in \(0, 0\.02\]"),
         ("physics_timestep", 0.025, r"numbers in \(0, 0\.02\]"),
@@ -103,8 +104,10 @@ def test_robot_that_the_physics_does_not_bear_is_refused(name: str, value: float
 
 
 def test_bounds_themselves_are_allowed_and_move_with_what_they_depend_on() -> None:
-    for robot, person in zip(ROBOT_RADII, PEDESTRIAN_RADII, strict=True):
-        Scenario(robot=Robot(radius=robot), pedestrian_radius=person)
+    for robot in (0.17, *ROBOT_RADII):
+        for person in (max(PEDESTRIAN_RADII[0], MIN_CONTACT_DISTANCE - robot), PEDESTRIAN_RADII[1]):
+            Scenario(robot=Robot(radius=robot), pedestrian_radius=person)
+    Scenario(robot=Robot(radius=0.2), pedestrian_radius=0.05)
     Scenario(control_timestep=1.0)
     Scenario(control_timestep=0.5, robot=Robot(max_speed=2.0))
     Scenario(control_timestep=0.01, turn_limit="per_second")

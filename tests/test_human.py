@@ -51,10 +51,10 @@ def test_two_replaced_people_stand_in_two_mirrored_rows():
 NAMES = ("time", "duration", "normal", "agent_velocity", "partner_velocity")
 
 
-@pytest.mark.parametrize(("radius", "touches"), [(0.12, 1), (0.113, 1), (0.112, 0)])
+@pytest.mark.parametrize(("radius", "touches"), [(0.19, 1), (0.183, 1), (0.182, 0)])
 def test_people_touch_only_nearer_than_the_sum_of_the_radii(radius, touches):
-    """The robot's radius is 0.1 m here; the two come as near as 0.3 / sqrt(2) = 0.2121 m."""
-    later = walk([(0, -3), (0, 3)], 1.0, begin=0.3)
+    """The robot's radius is 0.1 m here; the two come as near as 0.4 / sqrt(2) = 0.2828 m."""
+    later = walk([(0, -3), (0, 3)], 1.0, begin=0.4)
     assert len(human(EAST, later, robot_radius=0.1, pedestrian_radius=radius).contact_time) == touches
 
 
