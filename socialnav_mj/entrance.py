@@ -52,7 +52,7 @@ class Ghosts:
         """Nobody is a ghost."""
         self._slots: set[int] = set()
 
-    def solidify(self, now: SlotCrowd, robots: Array, *, distance: float) -> IntArray:
+    def solidify(self, now: SlotCrowd, robots: Array, *, distance: float) -> tuple[IntArray, IntArray]:
         """Take in who has just appeared, and let go whom no robot overlaps.
 
         Args:
@@ -61,15 +61,17 @@ class Ghosts:
             distance: Centre distance at which a robot and a person touch [m].
 
         Returns:
-            Slots of those who may touch robots from now on, ascending.
+            Slots of those who may touch robots from now on, ascending; and who passes through whom, (slot, row of
+            `robots`) of every overlap, shape (j, 2).
         """
         changed = set(now.changed.tolist())
         self._slots = (self._slots - changed) | (changed & set(now.present.tolist()))
         pending = np.array(sorted(self._slots), dtype=np.int64)
-        gap = np.linalg.norm(now.position[pending][:, None] - robots, axis=-1)
-        clear = (gap > distance).all(axis=1)
+        overlap = np.linalg.norm(now.position[pending][:, None] - robots, axis=-1) <= distance
+        clear = ~overlap.any(axis=1)
         self._slots = set(pending[~clear].tolist())
-        return pending[clear]
+        ghost, robot = np.nonzero(overlap)
+        return pending[clear], np.stack([pending[ghost], robot], axis=1)
 
 
 def is_free(place: Array, *, people: Array, robots: Array, scenario: Scenario) -> bool:

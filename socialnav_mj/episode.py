@@ -55,6 +55,8 @@ class Episode:
     """(n,) sample at which its run ended, however it did; NaN if never spawned [s]."""
     agent_outcome: IntArray
     """(n,) values of `Outcome`."""
+    agent_ghost_overlaps: IntArray
+    """(n,) people who appeared on a robot and then, contact-free, overlapped this agent at a control step or more."""
 
     agent_position: Array
     """(t, n, 2) from the spawn's sample to the end's, both included [m]."""

@@ -18,6 +18,7 @@ _SAME_TIME = 1e-6
 _INTEGER_FIELDS = {
     "agent_person",
     "agent_outcome",
+    "agent_ghost_overlaps",
     "agent_policy",
     "pedestrian_person",
     *(f"contact_{name}" for name in INTEGER_COLUMNS),
@@ -107,6 +108,9 @@ def _check_people(episode: "Episode") -> None:
         raise EpisodeError("a person cannot be replaced and replayed at once")
     if not np.isin(episode.agent_outcome, list(Outcome)).all():
         raise EpisodeError(f"agent_outcome holds values outside {[int(o) for o in Outcome]}")
+    ghosts, spawned = episode.agent_ghost_overlaps, episode.agent_outcome != Outcome.NEVER_SPAWNED
+    if np.any((ghosts < 0) | (ghosts > len(episode.pedestrian_person) * spawned)):
+        raise EpisodeError("agent_ghost_overlaps must be 0 to the number of pedestrians, and 0 if never spawned")
     if np.any(episode.agent_policy >= len(episode.policies)) or np.any(episode.agent_policy < -1):
         raise EpisodeError(f"agent_policy holds values outside -1..{len(episode.policies) - 1}")
 

@@ -63,8 +63,8 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
             for k, i in enumerate(cast.pedestrian_index)
         ),
     ]
-    contacts = _contacts(recording, scenario, people, np.concatenate([position, there], axis=1))
     n = cast.n_agents
+    contacts, ghosts = _contacts(recording, scenario, people, np.concatenate([position, there], axis=1))
     digest = state_hash(position, velocity)
     return Episode(
         time=time,
@@ -76,6 +76,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
         agent_deadline=np.full(n, np.nan),
         agent_end_time=end * dt,
         agent_outcome=np.full(n, Outcome.ARRIVED, dtype=np.int64),
+        agent_ghost_overlaps=np.bincount(ghosts, minlength=n).astype(np.int64),
         agent_position=position,
         agent_heading=heading,
         agent_velocity=velocity,
@@ -120,11 +121,14 @@ def _yaw_rate(heading: Array, dt: float) -> Array:
     return np.concatenate([np.nan_to_num(turned), np.zeros_like(heading[:1])])
 
 
-def _contacts(recording: Recording, scenario: Scenario, people: list[_Person], position: Array) -> list[Contact]:
-    """Touches as each agent among two people would have felt them, without forces."""
+def _contacts(
+    recording: Recording, scenario: Scenario, people: list[_Person], position: Array
+) -> tuple[list[Contact], list[int]]:
+    """Touches as each agent among two people would have felt them, without forces; and agents on whom one appeared."""
     limit, dt, h = scenario.contact_distance, scenario.control_timestep, scenario.physics_timestep
     pairs = _close_pairs(position, limit + _FASTEST_APPROACH * dt)
     contacts: list[Contact] = []
+    ghosts: list[int] = []
     for a, b in pairs:
         one, two = people[a], people[b]
         if one.kind == two.kind == Partner.PEDESTRIAN:
@@ -136,6 +140,8 @@ def _contacts(recording: Recording, scenario: Scenario, people: list[_Person], p
         apart = np.linalg.norm(y - x, axis=1)
         for start, stop in _runs(apart <= limit, merge=round(scenario.contact_rearm_time / h)):
             if start == 0:
+                if two.kind == Partner.PEDESTRIAN and two.first > one.first:
+                    ghosts.append(one.row)
                 continue
             normal = (y[start] - x[start]) / max(float(apart[start]), 1e-9)
             before = start - 1
@@ -158,7 +164,7 @@ def _contacts(recording: Recording, scenario: Scenario, people: list[_Person], p
                 for agent, other, direction, heading, own_velocity, other_velocity in sides
                 if agent.kind == Partner.AGENT
             ]
-    return contacts
+    return contacts, ghosts
 
 
 def _close_pairs(position: Array, distance: float) -> list[tuple[int, int]]:

@@ -86,6 +86,9 @@ class Recorder:
             agent_deadline=spawn_time + cast.agent_allowed_steps * dt,
             agent_end_time=np.where(spawned, end_step * dt, np.nan),
             agent_outcome=np.where(task.outcome >= 0, task.outcome, unfinished).astype(np.int64),
+            agent_ghost_overlaps=np.bincount([agent for agent, _ in sorted(task.ghost_overlaps)], minlength=n).astype(
+                np.int64
+            ),
             agent_position=position,
             agent_heading=heading,
             agent_velocity=velocity,

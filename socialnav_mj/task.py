@@ -60,6 +60,7 @@ class CrowdTask(base.Task):
         self.spawn_step = np.full(n, -1, dtype=np.int64)
         self.end_step = np.full(n, -1, dtype=np.int64)
         self.collisions: list[Collision] = []
+        self.ghost_overlaps: set[tuple[int, int]] = set()
         self._slot_agent = np.full(slots, NOBODY, dtype=np.int64)
         self._queue = AgentQueue(self.cast)
         self._ghosts = Ghosts()
@@ -231,8 +232,10 @@ class CrowdTask(base.Task):
         if now.changed.size:
             physics.park_pedestrians(now.changed)
         physics.set_pedestrian_pose(now.present, now.position[now.present], now.quaternion[now.present])
-        solid = self._ghosts.solidify(now, self._robots(physics), distance=self.scenario.contact_distance)
+        solid, overlaps = self._ghosts.solidify(now, self._robots(physics), distance=self.scenario.contact_distance)
         physics.set_pedestrian_contacts(solid, np.ones(len(solid), dtype=bool))
+        agent = self._slot_agent[self._slot_agent != NOBODY]
+        self.ghost_overlaps |= {(int(agent[robot]), int(now.pedestrian[slot])) for slot, robot in overlaps}
 
     def _robots(self, physics: Physics) -> Array:
         """Positions of the robots under way, shape (k, 2) [m]."""

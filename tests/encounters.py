@@ -110,6 +110,7 @@ def encounters() -> dict[str, Encounter]:
             steps=25,
             hand={
                 "success": 0,
+                "success_if_ghosts_count": 0,
                 "arrived": 0,
                 "timed_out": 1,
                 "completion_time": NAN,
@@ -144,6 +145,8 @@ def encounters() -> dict[str, Encounter]:
 
 ORDINARY: dict[str, float] = {
     "success": 1,
+    "success_if_ghosts_count": 1,
+    "ghost_overlaps": 0,
     "arrived": 1,
     "timed_out": 0,
     "overturned": 0,

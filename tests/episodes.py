@@ -44,6 +44,8 @@ class Agent:
     """(2,) [m]; its last position if not given."""
     person: int | None = None
     """Id; its index if not given."""
+    ghosts: int = 0
+    """People who appeared on it."""
     policy: ArrayLike = 0
     """Index into the policies, one number or one for each of the k - 1 active samples."""
 
@@ -172,6 +174,7 @@ def build_episode(
         agent_deadline=spawn_time + allowed,
         agent_end_time=np.where(spawned, start_time + step * last, np.nan),
         agent_outcome=np.array([a.outcome for a in agents], dtype=np.int64),
+        agent_ghost_overlaps=np.array([a.ghosts for a in agents], dtype=np.int64),
         **{f"agent_{name}": value for name, value in body.items()},
         agent_tilt=tilt,
         agent_wheel_speed=wheel_speed,

@@ -95,6 +95,20 @@ def test_touch_after_the_arrival_is_not_counted():
     assert not len(human(EAST, stand((3.0, 0.2), 0.0, 6.0)).contact_time)
 
 
+def test_pedestrian_who_appears_on_the_replaced_person_is_a_ghost_and_one_who_was_there_is_not():
+    """At 2.2 s the person is at x = -1.8; who appeared with it, or before it, is no ghost."""
+    person = walk([(-3, 0), (3, 0)], 1.0, begin=1.0)
+    appears = walk([(-1.7, 0.1), (-1.7, 3.0)], 1.0, begin=2.2)
+    was_there = stand((-2.9, 0.2), 0.0, 2.0)
+    with_it = walk([(-3, -0.3), (3, -0.3)], 1.0, begin=1.0)
+    episode = human(person, appears)
+    assert episode.agent_ghost_overlaps.tolist() == [1] and not len(episode.contact_time)
+    values = per_agent(episode)
+    assert values["success"].tolist() == [True] and values["success_if_ghosts_count"].tolist() == [False]
+    for other in (was_there, with_it):
+        assert human(person, other).agent_ghost_overlaps.tolist() == [0]
+
+
 def test_replayed_and_replaced_people_are_those_of_the_robots_episode():
     environment = environment_of(*busy_crowd(), agents=[2, 5, 7])
     episode = human_episode(environment.task.recording, environment.task.scenario)

@@ -9,9 +9,11 @@ from dm_control.rl import control
 from scenes import TINY, busy_crowd, environment_of, stand, state_of, still, walk
 
 import tasks
+from socialnav_mj import metrics
 from socialnav_mj.controllers import GoStraight, Limits
 from socialnav_mj.episode import Outcome, Partner
 from socialnav_mj.geometry import Array
+from socialnav_mj.rollout import rollout
 from socialnav_mj.task import ARRIVAL_REWARD, COLLISION_REWARD, PROGRESS_REWARD
 
 DT = 0.2  # control step [s]
@@ -161,6 +163,30 @@ def test_person_who_appears_on_a_robot_collides_only_after_having_been_clear() -
         environment.step(still(environment))
     (collision,) = environment.task.collisions
     assert collision.touch.time == pytest.approx(2.79, abs=0.011)
+    assert environment.task.ghost_overlaps == {(0, 0)}
+
+
+def test_ghost_counts_once_for_every_robot_that_it_overlaps_and_nobody_else_does() -> None:
+    # Appears at 1 s between two robots 0.4 m apart, 0.2 m from each, and leaves across.
+    ghost = walk([(0.0, 0.2), (-3.0, 0.2)], 1.0, begin=1.0)
+    robots = walk([(0, 0), (9, 0)], 1.0), walk([(0, 0.4), (9, 0.4)], 1.0), walk([(0, 3), (9, 3)], 1.0)
+    environment = environment_of(*robots, ghost, walk([(1, -2), (1, 8)], 1.0), agents=[1, 2, 3])
+    wait(environment, 30)
+    assert environment.task.ghost_overlaps == {(0, 0), (1, 0)}
+    environment.reset()
+    assert environment.task.ghost_overlaps == set()
+
+
+def test_overlap_with_a_ghost_is_recorded_and_takes_success_only_where_ghosts_count() -> None:
+    # The robot is at x = 0.8 m or so at 1 s; the ghost begins there and goes away sideways.
+    crowd = walk([(0, 0), (4, 0)], 1.0), walk([(0.9, 0.1), (0.9, 3.0)], 1.0, begin=1.0)
+    episode = rollout(environment_of(*crowd, agents=[1]), GoStraight())
+    assert episode.agent_ghost_overlaps.tolist() == [1] and not len(episode.contact_time)
+    assert metrics.success(episode).tolist() == [True]
+    assert metrics.success_if_ghosts_count(episode).tolist() == [False]
+    alone = rollout(environment_of(crowd[0], walk([(0.9, 1.1), (0.9, 3.0)], 1.0, begin=1.0), agents=[1]), GoStraight())
+    assert alone.agent_ghost_overlaps.tolist() == [0]
+    assert metrics.success_if_ghosts_count(alone).tolist() == [True]
 
 
 def test_person_who_appears_on_a_robot_and_leaves_has_never_touched_it() -> None:
@@ -168,6 +194,7 @@ def test_person_who_appears_on_a_robot_and_leaves_has_never_touched_it() -> None
     environment = environment_of(walk([(0, 0), (9, 0)], 1.0), person, agents=[1])
     wait(environment, 30)
     assert not environment.task.collisions
+    assert environment.task.ghost_overlaps == {(0, 0)}
 
 
 def test_new_person_in_a_used_slot_touches_anew() -> None:

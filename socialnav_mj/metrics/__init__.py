@@ -43,9 +43,11 @@ from socialnav_mj.metrics.navigation import (
 from socialnav_mj.metrics.outcomes import (
     arrived,
     completion_censored,
+    ghost_overlaps,
     never_spawned,
     overturned,
     success,
+    success_if_ghosts_count,
     timed_out,
 )
 from socialnav_mj.metrics.path import failures_to_progress, path_irregularity, spl
@@ -88,6 +90,7 @@ __all__ = [
     "distance_to_displacement",
     "failures_to_progress",
     "first_partner",
+    "ghost_overlaps",
     "intimate_intrusions",
     "intrusion_share",
     "largest_closing_speed",
@@ -118,6 +121,7 @@ __all__ = [
     "spl",
     "struck_standing",
     "success",
+    "success_if_ghosts_count",
     "time_not_moving",
     "time_shoved_standing",
     "time_under_way",

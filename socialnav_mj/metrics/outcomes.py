@@ -38,6 +38,30 @@ def success(episode: Episode) -> BoolArray:
     return arrived(episode) & (collisions(episode) == 0)
 
 
+def ghost_overlaps(episode: Episode) -> NDArray[np.int64]:
+    """Number of people who appeared on a robot and overlapped this agent before they were clear: no collisions.
+
+    Args:
+        episode: Record of n agents.
+
+    Returns:
+        Shape (n_agents,); 0 for agents that never spawned.
+    """
+    return episode.agent_ghost_overlaps.copy()
+
+
+def success_if_ghosts_count(episode: Episode) -> BoolArray:
+    """Success of a rule that takes it from whoever overlaps a ghost, too: the least that `success` could be.
+
+    Args:
+        episode: Record of n agents; outcomes, the contact log and overlaps of ghosts are used.
+
+    Returns:
+        Shape (n_agents,).
+    """
+    return success(episode) & (ghost_overlaps(episode) == 0)
+
+
 def timed_out(episode: Episode) -> BoolArray:
     """Whether each agent's deadline passed before it arrived.
 
@@ -96,6 +120,25 @@ METRICS = (
         needs=(Need.CONTACTS,),
         formula="arrived, and no collision with anybody",
         source="paper 1; CrowdNav and SocNavBench alike; Francis 2023 and HuNavSim count arrival alone",
+    ),
+    Metric(
+        name="success_if_ghosts_count",
+        function=success_if_ghosts_count,
+        kind=Kind.FLAG,
+        better=Better.MORE,
+        missing=NEVER,
+        needs=(Need.CONTACTS,),
+        formula="the same, and overlapped no ghost",
+        source="ours; below",
+    ),
+    Metric(
+        name="ghost_overlaps",
+        function=ghost_overlaps,
+        kind=Kind.COUNT,
+        better=Better.LESS,
+        missing=NEVER,
+        formula="people who appeared on a robot and overlapped the agent until they were clear; no collisions",
+        source="ours; below",
     ),
     Metric(
         name="arrived",

@@ -24,6 +24,7 @@ STATE_HASH = "state_hash"
 """Of the episode."""
 
 SUCCESS = "success"
+SUCCESS_IF_GHOSTS_COUNT = "success_if_ghosts_count"
 ARRIVED = "arrived"
 TIMED_OUT = "timed_out"
 OVERTURNED = "overturned"
@@ -54,6 +55,8 @@ INTRUSION_SHARE_OF_STEPS = "intrusion_share_of_steps"
 
 ORDER = (
     SUCCESS,
+    SUCCESS_IF_GHOSTS_COUNT,
+    "ghost_overlaps",
     ARRIVED,
     TIMED_OUT,
     OVERTURNED,

@@ -12,6 +12,7 @@ from socialnav_mj.report.markdown import bounds, code, head, number, plain, row
 
 _COLUMNS = (
     col.SUCCESS,
+    col.SUCCESS_IF_GHOSTS_COUNT,
     col.FIRST_HIT_PEDESTRIAN,
     col.FIRST_HIT_AGENT,
     col.TIMED_OUT,
@@ -35,6 +36,8 @@ narrow for fewer than about 10). Controllers that share draws drove the same age
 - **human**: the recorded people themselves, each on its own track instead of the agent that replaced it, scored by \
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
 - **success**: arrived, and had no collision on the way, whoever was at fault; over all agents.
+- **success if ghosts count**: a person whose track begins on a robot passes through it as a ghost until clear, which \
+is no collision; here whoever overlapped one did not succeed.
 - **hit first by**: share of all agents whose first collision was with a pedestrian, or with another agent.
 - **timed out**: share of all agents whose deadline passed; **overturned**: of those that ended on their side or back, \
 which fails and ends the trip.

@@ -30,7 +30,7 @@ pedestrian's as counts for a collision above."""
 
 _SEVERITY = """\
 Collisions with people against ISO/TS 15066's limits for the lower leg, where the bumper strikes: 130 N, or 260 N for \
-at most 0.5 s. *Impact*: the first 0.1 s from its beginning; *expected*: the momentum that two free bodies exchange \
+at most 0.5 s. *Impact*: the first 0.1 s of a collision; *expected*: the momentum that two free bodies exchange \
 at the closing speed. *Simulated*: the impact's largest force in MuJoCo, softer than flesh, and the mean force of the \
 push after it; *flesh*: the specification's own estimate from the closing speed for a free robot, without padding. \
 *Clamped*: the robot touched two bodies during the impact; its force means nothing. *Pushed*: time in touch after the \

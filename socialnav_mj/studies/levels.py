@@ -12,6 +12,7 @@ from socialnav_mj.studies.panel import COMMON, METHODS, Panel, Term
 
 LEVEL_MEASURES = (
     col.SUCCESS,
+    col.SUCCESS_IF_GHOSTS_COUNT,
     col.TIMED_OUT,
     col.FIRST_HIT_PEDESTRIAN,
     col.FIRST_HIT_AGENT,

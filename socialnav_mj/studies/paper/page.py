@@ -26,6 +26,7 @@ _COLUMNS = (
     ("time, all, censored [s]", "time_under_way", 2),
     ("path ratio, same agents", f"distance_to_displacement_success{COMMON}", 3),
     ("path ratio, own successes", "distance_to_displacement_success", 3),
+    ("success if ghosts count", "success_if_ghosts_count", 3),
 )
 _HOW_TO_READ = """\
 Means over draws (a draw is one random choice of the people who are replaced) and training seeds. Brackets, and the \
