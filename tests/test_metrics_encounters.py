@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from encounters import encounters, hand_values
+from episodes import Agent, Pedestrian, build_episode, line
 
 from socialnav_mj import metrics
 from socialnav_mj.metrics.dialects import DIALECTS, compute
@@ -105,6 +106,22 @@ def test_space_compliance_of_francis2023_is_the_complement_of_ours():
     # |4.1 - 0.2 k| < 0.5: steps 19 to 22 and perhaps, at 0.5 but for rounding, 18 or 23
     ours, theirs = metrics.space_compliance(episode), compute(episode, "francis2023")["space_compliance"]
     assert ours + theirs == pytest.approx([1.0])
+
+
+def test_time_to_collision_of_francis2023_ends_at_the_personal_space():
+    """A person who stands 0.4 m off a straight way at 1 m/s: 0.5 m apart 0.3 m before it, and never a collision."""
+    agent = Agent(positions=line((0, 0), (2, 0), 10), goal=(3, 0))
+    episode = build_episode([agent], [Pedestrian(positions=np.tile((3.0, 0.4), (11, 1)))])
+    assert compute(episode, "francis2023")["minimum_time_to_collision"] == pytest.approx([3.0 - 1.8 - 0.3])
+    assert metrics.minimum_time_to_collision(episode).tolist() == [math.inf]
+
+
+def test_hunavsim_takes_a_turn_to_the_right_for_standing():
+    """abs(rate < 0.01): on the spot at 1 rad/s to the left it moves, to the right it stands, for all 10 steps."""
+    episode = build_episode([Agent(positions=np.zeros((11, 2)), goal=(3, 0))], [])
+    turning = {s: replace(episode, agent_yaw_rate=np.full_like(episode.agent_yaw_rate, s)) for s in (1.0, -1.0)}
+    stopped = [float(compute(turning[s], "hunavsim")["time_not_moving"][0]) for s in (1.0, -1.0)]
+    assert stopped == pytest.approx([0.0, 2.0])
 
 
 def test_irregularity_of_socnavbench_changes_when_the_map_is_moved_and_ours_does_not():

@@ -35,15 +35,15 @@ from socialnav_mj.metrics.navigation import (
 from socialnav_mj.metrics.outcomes import arrived, never_spawned, success, timed_out
 from socialnav_mj.metrics.pairs import Pairs, largest_over, mean_over, pairs, radii
 from socialnav_mj.metrics.path import failures_to_progress
-from socialnav_mj.metrics.proxemics import ZONES, space_compliance
+from socialnav_mj.metrics.proxemics import COMPLIANT_DISTANCE, ZONES, space_compliance
 from socialnav_mj.metrics.proximity import intimate_intrusions, minimum_distance, nearest_pedestrian_distance
 from socialnav_mj.metrics.social_force import summed_social_work
-from socialnav_mj.metrics.time_to_collision import minimum_time_to_collision
+from socialnav_mj.metrics.time_to_collision import disc_contact_time
 
 TOUCHING_GAP = 0.02
 """HuNavSim counts a collision on every step with a smaller gap between the bodies [m]."""
 STOPPED_SPEED, STOPPED_YAW_RATE = 0.001, 0.01
-"""Below both HuNavSim takes the robot to stand [m/s], [rad/s]."""
+"""Below both HuNavSim takes the robot to stand [m/s], [rad/s]; the yaw rate with its sign, see `hunavsim`."""
 DISCOMFORT_GAP = 0.2
 """CrowdNav's discomfort_dist: a smaller gap between the bodies is danger [m]."""
 
@@ -109,7 +109,9 @@ def hunavsim(episode: Episode) -> dict[str, Array]:
     The average distance is between surfaces, the minimum and the zones are from the robot's *surface* to the person's
     *centre*; zones are exclusive bands in percent of steps; collisions are counted once a step and person, within 2 cm.
     Which of the two collided is decided there with swapped arguments of atan2, so the sum alone is given. time_not_
-    moving also asks for a yaw rate under 0.01 rad/s. social_work is a sum over steps.
+    moving also asks for a yaw rate under 0.01 rad/s, but `abs(r.angular_vel < 0.01)` takes the absolute value of the
+    comparison and not of the rate, so a robot that turns on the spot stands if it turns to the right. social_work is a
+    sum over steps.
 
     Args:
         episode: Record of n agents; outcomes, radii, yaw rates, and the tracks of agents and pedestrians are used.
@@ -124,7 +126,7 @@ def hunavsim(episode: Episode) -> dict[str, Array]:
     zones = {name: (gap >= begin) & (gap < end) for name, (begin, end) in ZONES.items()}
     zones["intimate"] = gap < ZONES["intimate"][1]
     touching = near.active & (near.distance - robot - person < TOUCHING_GAP)
-    still = (speed(episode) < STOPPED_SPEED) & (np.abs(episode.agent_yaw_rate) < STOPPED_YAW_RATE) & active
+    still = (speed(episode) < STOPPED_SPEED) & (episode.agent_yaw_rate < STOPPED_YAW_RATE) & active
     steps = active_steps(episode)
     return {
         "completed": arrived(episode).astype(float),
@@ -147,8 +149,8 @@ def francis2023(episode: Episode) -> dict[str, Array]:
     """Francis et al. (2023), Principles and guidelines, table 1.
 
     Success is arrival, with collisions counted apart. Space compliance is printed as the ratio of the trajectory
-    *under* 0.5 m, so that more is worse. Time to collision assumes linear motion; bodies are not said to be points or
-    discs, we take discs. Thresholds that the table leaves open are ours.
+    *under* 0.5 m, so that more is worse. Time to collision assumes linear motion and names the personal space, so it
+    ends where the centres are 0.5 m apart, the same distance. Thresholds that the table leaves open are ours.
 
     Args:
         episode: Record of n agents; outcomes, contacts, starts, goals, radii and all tracks are used.
@@ -156,6 +158,7 @@ def francis2023(episode: Episode) -> dict[str, Array]:
     Returns:
         Values by the table's names, shape (n_agents,).
     """
+    near = pairs(episode)
     shortest, walked = displacement(episode), np.fmax(path_length(episode), displacement(episode))
     efficiency = np.divide(shortest, walked, out=np.ones_like(shortest), where=walked > 0.0)
     return {
@@ -178,7 +181,9 @@ def francis2023(episode: Episode) -> dict[str, Array]:
         "jerk_max": maximum_jerk(episode),
         "space_compliance": 1.0 - space_compliance(episode),
         "minimum_distance_to_human": minimum_distance(episode),
-        "minimum_time_to_collision": minimum_time_to_collision(episode),
+        "minimum_time_to_collision": _smallest(
+            episode, near, disc_contact_time(near.offset, near.velocity, COMPLIANT_DISTANCE)
+        ),
     }
 
 

@@ -221,6 +221,7 @@ METRICS = (
         missing=NEVER_SPAWNED,
         needs=(Need.VELOCITY,),
         formula="dt times steps with |v| < 0.1 m/s, at most T",
-        source="HuNavSim: < 0.001 m/s and < 0.01 rad/s; Francis 2023 leaves it open. Robots start from rest",
+        source="HuNavSim: < 0.001 m/s and < 0.01 rad/s, any turn to the right included; Francis 2023 leaves it open. "
+        "Robots start from rest",
     ),
 )

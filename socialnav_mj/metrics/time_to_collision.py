@@ -68,7 +68,7 @@ METRICS = (
         needs=(Need.POSITION, Need.VELOCITY, Need.PEDESTRIANS),
         formula="min over steps and people of the smallest t >= 0 with |dx + dv t| <= 0.32 m; inf: never on collision "
         "course",
-        source="SocNavBench: along the line of centres, so passing is colliding; Francis 2023: linear motion, bodies "
-        "not specified",
+        source="SocNavBench: along the line of centres, so passing is colliding; Francis 2023: until the "
+        "personal space (0.5 m) is entered, see Dialects",
     ),
 )
