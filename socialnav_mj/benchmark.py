@@ -1,7 +1,9 @@
 """What an episode costs beside the bare physics: measured side by side in one run, as ratios."""
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -13,6 +15,7 @@ from dm_control.rl import control
 
 import tasks
 from socialnav_mj.controllers import Limits, make_controller
+from socialnav_mj.environment import make_environment
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording
 from socialnav_mj.rollout import rollout
@@ -99,21 +102,112 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class ControllerCost:
+    """What a controller's own computation costs beside the physics that it drives."""
+
+    controller: str
+    n_agents: float
+    """Agents under way, the mean over control steps."""
+    act_cpu: float
+    """CPU time of `act` for an agent and control step, the median over repetitions [s]."""
+    physics_cpu: float
+    """Of bare `mj_step` calls, from the states that it led to, for an agent and control step, the median [s]."""
+    ratio: float
+    """act_cpu / physics_cpu, the median of the ratios within each repetition."""
+    ratio_low: float
+    """The least of them."""
+    ratio_high: float
+    """The greatest."""
+
+
+def measure_controllers(
+    controllers: Sequence[str],
+    *,
+    n_agents: int = 60,
+    n_pedestrians: int = 60,
+    control_steps: int = 40,
+    repetitions: int = 3,
+) -> list[ControllerCost]:
+    """Cost of controllers for as many agents at once, in a made-up crowd as dense as students003.
+
+    Args:
+        controllers: As `make_controller` takes them.
+        n_agents: All under way from the first step to the last.
+        n_pedestrians: All there as long.
+        control_steps: Length of an episode.
+        repetitions: Episodes and bare runs of each controller, in turn.
+
+    Returns:
+        A row for each controller.
+    """
+    crowd = _crossing_crowd(n_agents + n_pedestrians)
+    share = n_agents / (n_agents + n_pedestrians)
+    result = []
+    for spec in controllers:
+        limit = (control_steps - 0.5) * 0.2
+        environment = make_environment(dataset=crowd, share=share, time_limit=limit)
+        _record_states(environment, spec)  # compiles and loads what the controller needs
+        acts, bare, active = [], [], 0
+        for _ in range(repetitions):
+            states = _record_states(environment, spec)
+            active = sum(state["active"] for state in states)
+            acts.append(sum(state["act_cpu"] for state in states) / active)
+            bare.append(_time_bare_steps(environment, states) / active)
+        ratios = [act / step for act, step in zip(acts, bare, strict=True)]
+        result.append(
+            ControllerCost(
+                controller=spec,
+                n_agents=active / len(states),
+                act_cpu=median(acts),
+                physics_cpu=median(bare),
+                ratio=median(ratios),
+                ratio_low=min(ratios),
+                ratio_high=max(ratios),
+            )
+        )
+    return result
+
+
+def _crossing_crowd(n_people: int) -> Recording:
+    """People on a grid, 2.5 m apart, who all start at once and cross each other's ways for 20 m at 1 m/s."""
+    random = np.random.default_rng(0)
+    side = ceil(n_people**0.5)
+    place = 2.5 * np.stack(np.divmod(np.arange(n_people), side), axis=1) + random.uniform(-0.8, 0.8, (n_people, 2))
+    # Across the middle, so that nobody leaves the crowd at once.
+    centre = place.mean(axis=0)
+    towards = centre + random.uniform(-4.0, 4.0, (n_people, 2)) - place
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    times = np.array([0.0, 10.0, 20.0])
+    return Recording(
+        name="crossing",
+        variant="text",
+        frame_rate=25.0,
+        ids=np.arange(1, n_people + 1),
+        times=(times,) * n_people,
+        positions=tuple(here + times[:, None] * way for here, way in zip(place, towards, strict=True)),
+        checksum="0" * 64,
+    )
+
+
 _DATA_FIELDS = ("qpos", "qvel", "qacc_warmstart", "ctrl", "mocap_pos", "mocap_quat")
 _MODEL_FIELDS = ("geom_contype", "geom_conaffinity", "body_gravcomp")
 
 
 def _record_states(environment: control.Environment, controller_name: str) -> list[dict[str, Any]]:
-    """What distinguishes the control steps of an episode, copied just before the physics of each."""
+    """What distinguishes the control steps of an episode, copied just before the physics of each, and act's cost."""
     physics: Physics = environment.physics
     controller = make_controller(controller_name)
     controller.reset(Limits.of(environment.task.scenario), seed=environment.task.scenario.seed)
     states = []
     time_step = environment.reset()
     while not time_step.last():
+        begin = process_time()
         action = controller.act(time_step.observation)
-        state = {name: getattr(physics.data.ptr, name).copy() for name in _DATA_FIELDS}
+        act_cpu = process_time() - begin
+        state: dict[str, Any] = {name: getattr(physics.data.ptr, name).copy() for name in _DATA_FIELDS}
         state |= {name: getattr(physics.model.ptr, name).copy() for name in _MODEL_FIELDS}
+        state |= {"act_cpu": act_cpu, "active": int(time_step.observation["active"].sum())}
         time_step = environment.step(action)
         state["ctrl"] = physics.data.ctrl.copy()
         states.append(state)

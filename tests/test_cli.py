@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from socialnav_mj import benchmark
 from socialnav_mj.cli import main
 from socialnav_mj.config import SETTINGS
 from socialnav_mj.episode import read_header
@@ -373,6 +374,19 @@ def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
     assert cost["ratio_low"] <= cost["ratio"] <= cost["ratio_high"]
     assert cost["real_time_factor"] == pytest.approx(cost["simulated_time"] / cost["episode_cpu"])
     assert content["recording"]["name"] == "tiny" and "mujoco" in content["versions"]
+
+
+def test_bench_of_controllers_sets_each_beside_the_physics_that_it_drives(capsys, monkeypatch):
+    few = partial(benchmark.measure_controllers, n_agents=4, n_pedestrians=3, control_steps=5)
+    monkeypatch.setattr(benchmark, "measure_controllers", few)
+    specs = ["go_straight", "mpc(preset='calm')"]
+    main(["bench", "--controllers", *specs, "--repetitions", "2", "--out", "bench.json"])
+    output = capsys.readouterr().out
+    assert "controller / mj_step" in output and "go_straight" in output
+    costs = json.loads(Path("bench.json").read_text())["controllers"]
+    assert [cost["controller"] for cost in costs] == specs
+    for cost in costs:
+        assert cost["n_agents"] == 4 and 0.0 < cost["ratio_low"] <= cost["ratio"] <= cost["ratio_high"]
 
 
 @pytest.mark.parametrize(

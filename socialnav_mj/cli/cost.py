@@ -5,7 +5,7 @@ import shlex
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.table import Table
@@ -16,7 +16,7 @@ from socialnav_mj.cli.console import console, errors
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure what episodes cost on one core, beside bare `mj_step` calls, as ratios."""
+    """Measure what episodes, or controllers, cost on one core, beside bare `mj_step` calls, as ratios."""
 
     dataset: str = "plaza"
     """Name in the catalogue, or path of a recording."""
@@ -26,6 +26,8 @@ class Bench:
     """Scenarios to measure."""
     controller: str = "potential_field"
     """Name, or package.module:Class, with settings if need be, as in `evaluate`."""
+    controllers: tuple[str, ...] = ()
+    """Controllers whose own cost for 60 agents is measured, in a made-up crowd; then no episodes are."""
     seed: int = 0
     """Seed of the draw."""
     repetitions: int = 3
@@ -34,10 +36,32 @@ class Bench:
     """JSON file to write, with package versions and the recording's checksum."""
 
     def run(self) -> None:
-        """Measure scenario by scenario, print a table, and write the JSON file if one is named."""
+        """Measure scenarios, or controllers if some are named, print a table, and write the file if one is named."""
+        if self.controllers:
+            self._measure_controllers()
+        else:
+            self._measure_episodes()
+
+    def _measure_controllers(self) -> None:
+        from socialnav_mj.benchmark import measure_controllers
+
+        costs = []
+        for spec in self.controllers:
+            with errors.status(spec):
+                costs += measure_controllers([spec], repetitions=self.repetitions)
+        table = Table(title="CPU time for an agent and control step, on one core", title_justify="left")
+        for heading in ("controller", "agents", "controller [us]", "mj_step [us]", "controller / mj_step"):
+            table.add_column(heading, justify="left" if heading == "controller" else "right")
+        for cost in costs:
+            ratio = f"{cost.ratio:.2f} ({cost.ratio_low:.2f} to {cost.ratio_high:.2f})"
+            times = (f"{1e6 * seconds:.0f}" for seconds in (cost.act_cpu, cost.physics_cpu))
+            table.add_row(cost.controller, f"{cost.n_agents:.0f}", *times, ratio)
+        console.print(table)
+        self._write({"controllers": [asdict(cost) for cost in costs]})
+
+    def _measure_episodes(self) -> None:
         from socialnav_mj.benchmark import measure
-        from socialnav_mj.files import write_whole
-        from socialnav_mj.provenance import PACKAGES, package_versions, recording_metadata
+        from socialnav_mj.provenance import recording_metadata
         from socialnav_mj.recordings import load_recording
 
         recording = load_recording(self.dataset, data_dir=self.data_dir)
@@ -72,11 +96,13 @@ class Bench:
         for label, cells in rows.items():
             table.add_row(label, *cells)
         console.print(table)
+        self._write({"recording": recording_metadata(recording), "costs": [asdict(cost) for cost in costs]})
+
+    def _write(self, content: dict[str, Any]) -> None:
+        """Write the measurements with the command and the versions, if a file is named."""
+        from socialnav_mj.files import write_whole
+        from socialnav_mj.provenance import PACKAGES, package_versions
+
         if self.out is not None:
-            content = {
-                "command": shlex.join(sys.argv),
-                "recording": recording_metadata(recording),
-                "versions": package_versions(PACKAGES),
-                "costs": [asdict(cost) for cost in costs],
-            }
-            write_whole(self.out, (json.dumps(content, indent=1) + "\n").encode())
+            whole = {"command": shlex.join(sys.argv), "versions": package_versions((*PACKAGES, "numba")), **content}
+            write_whole(self.out, (json.dumps(whole, indent=1) + "\n").encode())

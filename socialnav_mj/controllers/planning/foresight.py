@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Limits, Observation
 from socialnav_mj.controllers.planning.tracks import Tracks, seen_by
-from socialnav_mj.controllers.prediction import LAGS, STEP, Prediction
+from socialnav_mj.controllers.prediction import LAGS, STEP, Prediction, constant_velocity
 from socialnav_mj.geometry import Array
 
 MOST_NEIGHBOURS = 12
@@ -40,7 +40,8 @@ class Foresight:
             limits: Of the episode; gives the time between two observations.
             steps: How many steps of `prediction.STEP` to look ahead.
         """
-        self._prediction, self._steps, self._elapsed = prediction, steps, limits.control_timestep
+        self._of_people, self._of_agents = prediction, constant_velocity(steps)
+        self._steps, self._elapsed = steps, limits.control_timestep
         self._lags = [round(lag * STEP / limits.control_timestep) for lag in LAGS]
         self._tracks = Tracks(depth=max(self._lags))
 
@@ -59,10 +60,12 @@ class Foresight:
         columns, real = _nearest(position, there)
         velocity = self._tracks.velocities(observation, rows, columns, self._lags)
         here = np.take_along_axis(position, columns[..., None], axis=1)[:, :, None]
-        moved = self._prediction(velocity, steps=self._steps)
+        person = columns < observation["pedestrian_mask"].shape[1]
+        people, agents = (of(velocity, steps=self._steps) for of in (self._of_people, self._of_agents))
+        moved = np.where(person[..., None, None], people, agents)
         path = np.concatenate([here, here + moved], axis=2).swapaxes(1, 2)
         path = np.where(real[:, None, :, None], path, NOWHERE)
-        return Ahead(path=path, real=real, person=columns < observation["pedestrian_mask"].shape[1])
+        return Ahead(path=path, real=real, person=person)
 
 
 def _nearest(position: Array, there: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
