@@ -259,8 +259,7 @@ class CrowdTask(base.Task):
             slot, free = int(free[0]), free[1:]
             physics.place_agent(slot, start, float(self.cast.agent_heading[agent]))
             self._queue.let_in(agent)
-            self._slot_agent[slot] = agent
-            self.spawn_step[agent] = self.step
+            self._slot_agent[slot], self.spawn_step[agent] = agent, self.step
             self._goal_distance[slot] = np.linalg.norm(self.cast.agent_goal[agent] - start, axis=-1)
         return len(free) < n_free
 
@@ -285,11 +284,10 @@ class CrowdTask(base.Task):
         arrived = distance <= self.scenario.goal_radius
         late = self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]
         overturned = self._sample.tilt[slots] > OVERTURNED_TILT
-        taken_out = np.isin(slots, struck if self.scenario.on_collision == "retire" else [])
         # What comes first here ends the run if several do in one step; it stays under way if none does.
         ways = {
             Outcome.OVERTURNED: overturned,
-            Outcome.COLLIDED: taken_out,
+            Outcome.COLLIDED: np.isin(slots, struck if self.scenario.on_collision == "retire" else []),
             Outcome.ARRIVED: arrived,
             Outcome.TIMED_OUT: late,
         }
@@ -297,7 +295,6 @@ class CrowdTask(base.Task):
         self._reward[slots[outcome == Outcome.ARRIVED]] += ARRIVAL_REWARD
         for row in np.flatnonzero(outcome != _UNDER_WAY):
             slot, agent = int(slots[row]), int(agents[row])
-            self.outcome[agent] = outcome[row]
-            self.end_step[agent] = self.step
+            self.outcome[agent], self.end_step[agent] = outcome[row], self.step
             self._slot_agent[slot] = NOBODY
             physics.park_agent(slot)

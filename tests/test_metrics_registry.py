@@ -24,10 +24,10 @@ from socialnav_mj.metrics.registry import check_metrics, per_agent
 from socialnav_mj.report import columns, power
 from socialnav_mj.report.agents import SCHEMA, agents_schema, agents_table
 from socialnav_mj.report.estimates import MEASURES, measures_of, summarise
-from socialnav_mj.studies import held_out, levels
+from socialnav_mj.studies import claims, held_out, levels
 from socialnav_mj.studies.leave_one_out import comparison
 from socialnav_mj.studies.panel import COMMON
-from socialnav_mj.studies.paper import claims, figures
+from socialnav_mj.studies.paper import figures
 
 EAST = line((0, 0), (4, 0), 20)
 

@@ -9,11 +9,13 @@ from operator import attrgetter
 from typing import Any
 
 from socialnav_mj.controllers.base import IS_CONTROLLER, Controller
+from socialnav_mj.controllers.dynamic_window import DynamicWindow
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
+from socialnav_mj.controllers.social_force import SocialForce
 
 ENTRY_POINT_GROUP = "socialnav_mj.controllers"
 
@@ -23,6 +25,8 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "replay_irl": ReplayIRL,
     "hybrid": Hybrid,
     "go_straight": GoStraight,
+    "social_force": SocialForce,
+    "dynamic_window": DynamicWindow,
     "mpc": MPC,
 }
 
