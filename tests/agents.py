@@ -97,7 +97,9 @@ def experiment_table(
             for name, kind in names.items():
                 own = {quantity: means[place] for quantity, means in values[kind].items()}
                 wander = drift[name] * luck * (1.0 + 0.2 * noise * random.standard_normal())
-                success = rank < own["success"] * wander
+                # Shares and counts are whole numbers of agents and steps: without this all draws would be equal.
+                success = rank < own["success"] * wander + 0.03 * (random.random() - 0.5)
+                steps = round(own["steps"] * wander) + random.integers(-1, 2, n_agents)
                 time = 10.0 * own["path"] / own["speed"] * wander
                 rows += rows_of(
                     name,
@@ -112,7 +114,7 @@ def experiment_table(
                         "completion_steps": round(5 * time),
                         "time_under_way": time,
                         "active_steps": 100,
-                        "intimate_intrusions": round(own["steps"] * wander),
+                        "intimate_intrusions": steps,
                         "intrusion_share": own["steps"] / 100.0 * wander,
                         "first_partner": np.where(success, "", "pedestrian"),
                     },

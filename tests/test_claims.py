@@ -1,4 +1,4 @@
-"""Claims on tables whose truth is known, and intervals that cover it as often as they say."""
+"""Claims on tables whose truth is known, and agents that are paired across controllers."""
 
 from dataclasses import replace
 
@@ -8,20 +8,13 @@ import pytest
 from agents import METHOD_VALUES, experiment_table, roster_of, rows_of, table_of
 
 from socialnav_mj.recordings import Recording
-from socialnav_mj.studies import intervals
 from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.findings import examine, verdict_of, verdict_of_all
 from socialnav_mj.studies.held_out import HELD_OUT, IN_SAMPLE, VALIDATION, period_of_people
-from socialnav_mj.studies.intervals import two_way_interval
 from socialnav_mj.studies.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry, Term, make_panel
 from socialnav_mj.studies.paper.claims_page import claims_page
 
 SEEDS = (0, 1, 2)
-
-
-@pytest.fixture(autouse=True)
-def few_resamples(monkeypatch):
-    monkeypatch.setattr(intervals, "N_RESAMPLES", 999)
 
 
 def verdicts(table, trainings=SEEDS):
@@ -95,45 +88,7 @@ def test_page_gives_rule_verdicts_effects_and_the_weakest_comparison_of_each_var
     weakest = next(line for line in page.splitlines() if line.startswith("| variant | fails "))
     assert "scenario_3: hybrid - potential field | -0.05" in weakest
     assert all(claim.sentence in page for claim in CLAIMS)
-
-
-def test_interval_of_one_column_is_students():
-    values = np.random.default_rng(3).standard_normal(12)
-    interval = two_way_interval(values[:, None], trained=False)
-    half = 2.201 * values.std(ddof=1) / np.sqrt(12)  # Student's 97.5 % quantile with 11 degrees of freedom
-    assert interval.mean == pytest.approx(values.mean())
-    assert 0.5 * (interval.high - interval.low) == pytest.approx(half, rel=0.1)
-    assert (interval.low, interval.high) == (interval.low_given, interval.high_given)
-
-
-@pytest.mark.parametrize(("by_draw", "by_training", "within"), [(1.0, 0.0, 0.3), (0.3, 1.0, 0.3), (1.0, 1.0, 1.0)])
-def test_intervals_cover_the_truth_as_often_as_they_say(monkeypatch, by_draw, by_training, within):
-    """10 draws, 3 trainings, 300 studies: 95 % with a standard error of 1.3 %; too wide is allowed, too narrow not."""
-    monkeypatch.setattr(intervals, "N_RESAMPLES", 400)
-    random = np.random.default_rng(5)
-    covered = covered_given = 0
-    for _ in range(300):
-        trainings = by_training * random.standard_normal((1, 3))
-        cells = by_draw * random.standard_normal((10, 1)) + trainings + within * random.standard_normal((10, 3))
-        interval = two_way_interval(cells, trained=True)
-        covered += interval.low <= 0.0 <= interval.high
-        covered_given += interval.low_given <= trainings.mean() <= interval.high_given
-    assert covered / 300 >= 0.92
-    assert 0.91 <= covered_given / 300 <= 0.985
-
-
-def test_interval_of_equal_cells_is_a_point_and_missing_cells_are_left_out():
-    cells = np.full((5, 3), 2.0)
-    cells[1, 2] = cells[4] = np.nan
-    interval = two_way_interval(cells, trained=True)
-    assert (interval.mean, interval.low, interval.high, interval.n_draws) == (2.0, 2.0, 2.0, 4)
-
-
-def test_interval_says_why_there_is_none():
-    assert "needs 3" in two_way_interval(np.ones((2, 3)), trained=True).note
-    assert two_way_interval(np.full((5, 3), np.nan), trained=True).note == "no agent has a value"
-    alone = two_way_interval(np.arange(5.0)[:, None], trained=True)
-    assert "one training" in alone.note and np.isfinite(alone.low)
+    assert "they say nothing about another crowd" in page
 
 
 def small_panel():

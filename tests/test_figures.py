@@ -10,7 +10,6 @@ from toy_policies import write_toy
 
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.report import style
-from socialnav_mj.studies import intervals
 from socialnav_mj.studies.levels import LEVEL_MEASURES, LevelTable, levels
 from socialnav_mj.studies.looks import LOOKS
 from socialnav_mj.studies.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
@@ -33,9 +32,7 @@ def coarse(monkeypatch):
 
 @pytest.fixture(scope="module")
 def table():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intervals, "N_RESAMPLES", 200)
-        return level_table(noise=0.02)
+    return level_table(noise=0.02)
 
 
 def texts(path):

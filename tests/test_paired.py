@@ -75,7 +75,6 @@ def results(run):
 def written(run):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("socialnav_mj.trace.writer.write_trace", lambda *_: None)
-        patch.setattr("socialnav_mj.report.estimates.N_RESAMPLES", 200)
         return writer.write_report(run).path.read_text()
 
 

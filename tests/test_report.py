@@ -23,6 +23,8 @@ from socialnav_mj.metrics.dialects import compute
 from socialnav_mj.report import writer
 from socialnav_mj.report.agents import SCHEMA, agents_table, read_results
 from socialnav_mj.report.estimates import MEASURES, draw_means, estimate, summarise
+from socialnav_mj.report.intervals import ONE_RECORDING
+from socialnav_mj.report.page import with_error
 
 LABELS = {"dataset": "d", "variant": "v", "scenario": "s", "controller": "c", "measure": "m"}
 CONTROLLERS = ("zigzag", "human", "potential_field")
@@ -57,14 +59,13 @@ def template(tmp_path_factory):
 
 @pytest.fixture
 def run(template, tmp_path, monkeypatch):
-    """A copy of the run; traces are replaced by a note of what they would show, resamples are few."""
+    """A copy of the run; traces are replaced by a note of what they would show."""
 
     def note(episode, path):
         path.parent.mkdir(exist_ok=True)
         path.write_text(episode.metadata["state_hash"])
 
     monkeypatch.setattr("socialnav_mj.trace.writer.write_trace", note)
-    monkeypatch.setattr("socialnav_mj.report.estimates.N_RESAMPLES", 200)
     return shutil.copytree(template, tmp_path / "run")
 
 
@@ -102,7 +103,7 @@ def test_summary_has_the_means_worked_out_by_hand(run):
     success = rows["scenario_1", "potential_field", "success"]  # draws: 1/2, 0, 1/2, 0
     assert (success.mean, success.n_draws, success.n_agents) == (0.25, 4, 8)
     assert success.standard_error == pytest.approx(math.sqrt(4 * 0.25**2 / 3) / 2)
-    assert 0.0 <= success.low < 0.25 < success.high <= 0.5
+    assert 0.0 < success.low < 0.25 < success.high < 1.0
     assert rows["scenario_1", "potential_field", "first_hit_pedestrian"].mean == 0.25
     assert rows["scenario_1", "potential_field", "timed_out"].mean == 0.5
     assert rows["scenario_1", "potential_field", "completion_time"].mean == pytest.approx(0.2 * (20 + 21 + 22 + 23) / 4)
@@ -145,7 +146,7 @@ def test_estimate_says_why_it_has_no_interval(values, note):
     array = np.array(values, dtype=float)
     result = estimate(array, np.ones(len(array)), np.arange(len(array)), labels=LABELS)
     assert result.note == note
-    assert math.isnan(result.low) == ("needs" in note or "no agent" in note)
+    assert math.isnan(result.low) == bool(note)
 
 
 def test_means_of_draws_weigh_agents_and_leave_out_draws_without_values():
@@ -161,8 +162,17 @@ def test_interval_covers_the_mean_of_normal_draws_about_as_often_as_it_says():
     for _ in range(trials):
         result = estimate(random.normal(0.7, 0.1, 20), np.ones(20), draws, labels=LABELS)
         hits += result.low <= 0.7 <= result.high
-    # 95 % at 20 draws is about 92 % for a bootstrap; three binomial standard deviations are 8 %
-    assert 0.84 * trials <= hits <= trials
+    assert 0.89 * trials <= hits <= trials  # three binomial standard deviations are 6.5 %
+
+
+def test_share_of_nobody_is_shown_with_the_bound_of_its_agents(run):
+    found = {(e.scenario, e.controller, e.measure): e for e in summarise(read_results(run).agents)}
+    nobody = found["scenario_1", "human", "overturned"]
+    bound = 1.959964**2 / (8 + 1.959964**2)
+    assert (nobody.mean, nobody.low, nobody.high) == (0.0, 0.0, pytest.approx(bound))
+    assert with_error(nobody, 3) == f"0.000 (0.000 to {bound:.3f})"
+    text = writer.write_report(run).path.read_text()
+    assert f"| 0.000 (0.000 to {bound:.3f}) |" in text and ONE_RECORDING in text
 
 
 def test_report_mentions_every_scenario_controller_and_hash(run):

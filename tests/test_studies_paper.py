@@ -15,7 +15,6 @@ from socialnav_mj.controllers import make_controller
 from socialnav_mj.episode import EpisodeError
 from socialnav_mj.report import style
 from socialnav_mj.report.agents import Results
-from socialnav_mj.studies import intervals
 from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.files import publish
 from socialnav_mj.studies.paper.outputs import PUBLIC, agents_of, write_outputs
@@ -49,7 +48,6 @@ def whole(experiment, of_both_limits):
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(intervals, "N_RESAMPLES", 99)
     monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
 
 

@@ -44,7 +44,9 @@ def dialect_estimates(
         for metric in own[0][1]:
             of_agents = np.concatenate([found[metric] for _, found in own])
             draws = np.concatenate([np.full(len(found[metric]), draw) for draw, found in own])
-            result.append(estimate(of_agents, np.ones_like(of_agents), draws, labels={**labels, "measure": metric}))
+            own_labels = {**labels, "measure": metric}
+            share = bool(np.isin(of_agents[np.isfinite(of_agents)], (0.0, 1.0)).all())
+            result.append(estimate(of_agents, np.ones_like(of_agents), draws, labels=own_labels, share=share))
     return result
 
 

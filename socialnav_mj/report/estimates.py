@@ -7,17 +7,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy.stats import bootstrap
 
 from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.metric import Mean, Metric
 from socialnav_mj.metrics.registry import METRICS
 from socialnav_mj.report.columns import CONTROLLER, DATASET, DRAW, SCENARIO, SUCCESS, VARIANT, place
-
-CONFIDENCE = 0.95
-MINIMUM_DRAWS = 3
-"""Fewer draws give no interval."""
-N_RESAMPLES = 9999
+from socialnav_mj.report.intervals import interval_of
 
 Columns = dict[str, NDArray[Any]]
 
@@ -73,6 +68,11 @@ class Measure:
     def limits(self) -> tuple[float, float]:
         """Least and greatest mean."""
         return (0.0, 1.0) if self.mean.share_of else self.metric.limits
+
+    @property
+    def is_share(self) -> bool:
+        """Whether its means are shares in [0, 1]."""
+        return self.limits == (0.0, 1.0)
 
 
 def measures_of(metrics: Sequence[Metric]) -> dict[str, Measure]:
@@ -135,57 +135,41 @@ def summarise(agents: pa.Table, measures: Mapping[str, Measure] = MEASURES) -> l
         In the table's order of controllers and scenarios, then in the order of the measures.
     """
     return [
-        estimate(values, weights, draws, labels={**labels, "measure": name})
+        estimate(values, weights, draws, labels={**labels, "measure": name}, share=measure.is_share)
         for labels, columns, draws in groups(agents)
         for name, measure in measures.items()
         for values, weights in [measured(columns, measure)]
     ]
 
 
-def estimate(values: Array, weights: Array, draws: NDArray[np.int64], *, labels: dict[str, str]) -> Estimate:
-    """Mean with its uncertainty, clustered by draw.
-
-    The interval is the bias-corrected and accelerated bootstrap over the draws' means (Efron 1987), with a fixed seed.
-    With few draws it is too narrow, as every bootstrap is.
+def estimate(
+    values: Array, weights: Array, draws: NDArray[np.int64], *, labels: dict[str, str], share: bool = False
+) -> Estimate:
+    """Mean with its uncertainty, clustered by draw; the interval is `intervals.interval_of` the draws' means.
 
     Args:
         values: One for each agent, shape (n,); NaN where it has none.
         weights: Of the agents within their draw, shape (n,), >= 0.
         draws: Draw of each agent, shape (n,).
         labels: The descriptive fields of the Estimate.
+        share: Whether the mean is a share in [0, 1].
 
     Returns:
         The estimate.
     """
     _, means = draw_means(values, weights, draws)
-    count = len(means)
-    mean = standard_error = low = high = float("nan")
-    note = ""
-    if count >= 1:
-        mean = float(means.mean())
-    if count >= 2:
-        standard_error = float(means.std(ddof=1) / np.sqrt(count))
-    if count == 0:
-        note = "no agent has a value"
-    elif count < MINIMUM_DRAWS:
-        note = f"{count} draw{'s' if count > 1 else ''}; an interval needs {MINIMUM_DRAWS}"
-    elif np.ptp(means) <= 1e-12 * max(1.0, abs(mean)):
-        low = high = mean
-        note = "all draws are equal"
-    else:
-        interval = bootstrap(
-            (means,), np.mean, confidence_level=CONFIDENCE, n_resamples=N_RESAMPLES, rng=np.random.default_rng(0)
-        ).confidence_interval
-        low, high = float(interval.low), float(interval.high)
+    n_agents = int(_defined(values, weights).sum())
+    interval = interval_of(means[:, None], agents=n_agents if share else None)
+    several = interval.n_draws >= 2
     return Estimate(
         **labels,
-        mean=mean,
-        standard_error=standard_error,
-        low=low,
-        high=high,
-        n_draws=count,
-        n_agents=int(_defined(values, weights).sum()),
-        note=note,
+        mean=interval.mean,
+        standard_error=float(means.std(ddof=1) / np.sqrt(len(means))) if several else float("nan"),
+        low=interval.low,
+        high=interval.high,
+        n_draws=interval.n_draws,
+        n_agents=n_agents,
+        note=interval.note,
     )
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, Estimate
-from socialnav_mj.report.markdown import bounds, code, head, number, plain, row
+from socialnav_mj.report.intervals import LEAST, ONE_RECORDING
+from socialnav_mj.report.markdown import bounds, code, head, interval, number, plain, row
 
 _COLUMNS = (
     col.SUCCESS,
@@ -26,12 +27,13 @@ _COLUMNS = (
 )
 """Measures in report.md; all are in summary.csv."""
 
-_HOW_TO_READ = """\
+_HOW_TO_READ = f"""\
 Every cell is the mean over draws ± its standard error; a draw is one random choice of the people who are replaced, \
-and its mean over agents is one number. The 95 % interval is a bootstrap over draws (none for fewer than 3 draws, too \
-narrow for fewer than about 10). Controllers that share draws drove the same agents, so compare them draw by draw \
-(`agents.parquet`). All other measures, defined in docs/metrics.md, are in `summary.csv`; every collision is a row of \
-`tables/collisions.parquet`.
+and its mean over agents is one number. The 95 % interval is Student's over draws, for shares Wilson's with the number \
+of agents that the spread between draws is worth (none for fewer than {LEAST} draws); where all draws have the same \
+share, it stands in place of the error. {ONE_RECORDING} Controllers that share draws drove the same agents, so compare \
+them draw by draw (`agents.parquet`). All other measures, defined in docs/metrics.md, are in `summary.csv`; every \
+collision is a row of `tables/collisions.parquet`.
 
 - **human**: the recorded people themselves, each on its own track instead of the agent that replaced it, scored by \
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
@@ -129,7 +131,7 @@ def by_scenario(
 
 
 def with_error(estimate: Estimate, digits: int) -> str:
-    """A mean and its standard error, as far as there is one.
+    """A mean and its standard error, as far as there is one; the interval of a share that is equal in all draws.
 
     Args:
         estimate: Of a measure.
@@ -138,5 +140,7 @@ def with_error(estimate: Estimate, digits: int) -> str:
     Returns:
         "-" where there is nothing to tell.
     """
+    if estimate.standard_error < 1e-12 and not math.isnan(estimate.low):
+        return interval(estimate.mean, estimate.low, estimate.high, digits)
     error = "" if math.isnan(estimate.standard_error) else f" ± {number(estimate.standard_error, digits)}"
     return number(estimate.mean, digits) + error

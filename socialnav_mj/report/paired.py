@@ -52,7 +52,7 @@ def pair_with_humans(agents: pa.Table, metrics: Sequence[Metric] = METRICS) -> p
 def paired_differences(agents: pa.Table) -> list[Estimate]:
     """Mean difference between agents and the people they replaced, draw by draw.
 
-    The mean over a draw's agents is one number, and the 95 % interval a bootstrap over draws (`estimates.estimate`).
+    The mean over a draw's agents is one number, with the 95 % interval over draws (`estimates.estimate`).
 
     Args:
         agents: Columns of `agents.SCHEMA`, paired.

@@ -9,7 +9,8 @@ import pyarrow as pa
 from scipy.stats import t as student
 
 from socialnav_mj.report import columns as col
-from socialnav_mj.report.estimates import CONFIDENCE, MEASURES, Columns, draw_means, groups, measured
+from socialnav_mj.report.estimates import MEASURES, Columns, draw_means, groups, measured
+from socialnav_mj.report.intervals import CONFIDENCE
 
 TARGETS = {col.SUCCESS: 0.05, col.TIME_UNDER_WAY: 1.0, col.INTRUSION_SHARE: 0.05, col.MINIMUM_DISTANCE: 0.05}
 """Measures and the differences that the report asks for, in the measure's unit."""

@@ -10,6 +10,7 @@ from socialnav_mj.geometry import Array
 from socialnav_mj.metrics.severity import Severity
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import Columns, Estimate, groups
+from socialnav_mj.report.intervals import LEAST
 from socialnav_mj.report.markdown import interval, table
 from socialnav_mj.report.paired import DIFFERENCES
 from socialnav_mj.report.power import Resolution, told
@@ -38,10 +39,11 @@ impact, mean over collisions. *Shoved standing*: collisions that struck an agent
 or longer. See docs/metrics.md.
 """
 
-_PAIRED = """\
+_PAIRED = f"""\
 Every agent beside the person it replaced (same start, goal and appearance): agent minus person, mean over draws, with \
-the 95 % bootstrap interval over draws (none for fewer than 3). *Time* is over all agents that spawned, time-outs \
-counted with the time they were watched; time and path *of arrivals* leave the others out. Intrusions are within 1.2 m.
+the 95 % interval over draws (none for fewer than {LEAST}, nor where all are equal). *Time* is over all agents that \
+spawned, time-outs counted with the time they were watched; time and path *of arrivals* leave the others out. \
+Intrusions are within 1.2 m.
 """
 
 _DRAWS = """\

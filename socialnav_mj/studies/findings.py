@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from socialnav_mj.report.intervals import Interval, interval_of
 from socialnav_mj.studies.claims import CLAIMS, Claim, Part
-from socialnav_mj.studies.intervals import Interval, two_way_interval
 from socialnav_mj.studies.panel import Panel
 
 Verdict = Literal["holds", "fails", "undecided"]
@@ -78,7 +78,7 @@ def _finding(panel: Panel, claim: Claim) -> Finding:
             missing.append(part.label)
             continue
         trained = any(panel.is_trained(term.method) for term in part.terms)
-        interval = two_way_interval(panel.contrast(part.terms), trained=trained)
+        interval = interval_of(panel.contrast(part.terms), trained=trained)
         parts.append((part, interval, verdict_of(interval.low, interval.high)))
         given.append(verdict_of(interval.low_given, interval.high_given))
     lacking: list[Verdict] = ["undecided"] * len(missing)

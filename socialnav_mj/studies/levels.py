@@ -7,7 +7,7 @@ import numpy as np
 
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES
-from socialnav_mj.studies.intervals import Interval, two_way_interval
+from socialnav_mj.report.intervals import Interval, interval_of
 from socialnav_mj.studies.panel import COMMON, METHODS, Panel, Term
 
 LEVEL_MEASURES = (
@@ -83,19 +83,20 @@ def _level(panel: Panel, scenario: str, method: str, measure: str, training: int
     term = Term(factor=1.0, method=method, scenario=scenario, measure=measure)
     trained = panel.is_trained(method)
     trainings = panel.trainings if training is None else (training,)
-    interval = two_way_interval(panel.contrast([term], trainings=trainings), trained=trained)
-    if MEASURES[measure.removesuffix(COMMON)].limits == (0.0, 1.0):  # a share's interval ends there
-        ends = ("low", "high", "low_given", "high_given")
-        clipped = {name: float(np.clip(getattr(interval, name), 0.0, 1.0)) for name in ends}
-        interval = Interval(**{**vars(interval), **clipped})
     counted = [panel.values(method, scenario, measure, t)[0] for t in (trainings if trained else (None,))]
+    n_values = sum(int(np.isfinite(value).sum()) for value in counted)
+    interval = interval_of(
+        panel.contrast([term], trainings=trainings),
+        trained=trained,
+        agents=max(n_values // len(counted), 1) if MEASURES[measure.removesuffix(COMMON)].is_share else None,
+    )
     return Level(
         scenario=scenario,
         method=method,
         training=training,
         measure=measure,
         interval=interval,
-        n_values=sum(int(np.isfinite(value).sum()) for value in counted),
+        n_values=n_values,
     )
 
 

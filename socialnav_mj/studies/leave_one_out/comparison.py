@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pyarrow as pa
 
+from socialnav_mj.report.intervals import interval_of
 from socialnav_mj.studies.held_out import HELD_OUT, IN_SAMPLE
-from socialnav_mj.studies.intervals import two_way_interval
 from socialnav_mj.studies.levels import Level, LevelTable, levels
 from socialnav_mj.studies.panel import REPLAY_IRL, Entry, Panel, Term, make_panel
 
@@ -116,6 +116,6 @@ def _difference(panel: Panel, scenario: str, name: str, held_out: str, in_sample
         method=name,
         training=None,
         measure=measure,
-        interval=two_way_interval(panel.contrast(terms), trained=True),
+        interval=interval_of(panel.contrast(terms), trained=True),
         n_values=int(np.sum(paired)),
     )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from socialnav_mj.report.intervals import LEAST, ONE_RECORDING
 from socialnav_mj.report.markdown import table
 from socialnav_mj.studies.cells import interval_cell
 from socialnav_mj.studies.files import traceability
@@ -17,12 +18,12 @@ _COLUMNS = (
     ("hit first by a pedestrian", "first_hit_pedestrian"),
     ("timed out", "timed_out"),
 )
-_HOW_TO_READ = """\
+_HOW_TO_READ = f"""\
 Every policy learned from all recordings but one; on the recording that it left out it is *held out*, on the others \
 *in-sample*. All rows of a scenario are about the same agents, those that replace people whom the in-sample policies \
 learned from: a held-out row as good as the in-sample rows says that what was learned holds for people never seen, a \
-worse one that part of it holds for those people alone. Brackets: 95 % interval for other draws and, given more than \
-one, other training seeds; all numbers are in tables/leave_one_out.csv.
+worse one that part of it holds for those people alone. Brackets: 95 % interval for other draws and, given {LEAST} \
+or more, other training seeds; all numbers are in tables/leave_one_out.csv. {ONE_RECORDING}
 """
 _DIFFERENCES = """\
 Taken agent by agent and training seed by training seed, over the seeds that both have; *- in-sample* is minus the \

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from math import isnan
 
+from socialnav_mj.report.intervals import LEAST, ONE_RECORDING, Interval
 from socialnav_mj.report.markdown import bounds, head, row
 from socialnav_mj.studies.claims import COMPARABLE, Part
 from socialnav_mj.studies.findings import Finding, Verdict
-from socialnav_mj.studies.intervals import Interval
 
 _RULE = f"""\
 - A claim is a list of comparisons, each a mean difference turned so that the claim says "greater than 0".
@@ -17,9 +17,10 @@ claim about all four scenarios so needs all four. With every comparison at its o
 in at most 2.5 % of studies; a claim of eight comparisons that are all exactly 0 would fail by chance in up to 20 %.
 - Within a draw all controllers drove the same agents. A comparison is taken agent by agent, averaged over the draw's \
 agents, then over draws; learned policies are compared training by training, the potential field standing beside each.
-- Intervals are bootstraps clustered by draw and by training seed: draws and trainings are resampled, with deviations \
-stretched for their small number (`socialnav_mj.studies.intervals`). Three trainings say little about a fourth: the \
-interval **for the trainings at hand** resamples draws alone, and its verdict stands in brackets where it differs.
+- Draws and training seeds are crossed random effects: the interval is Student's with the variance of both and \
+Satterthwaite's degrees of freedom (`socialnav_mj.report.intervals`; docs/results.md has its simulated coverage). The \
+interval **for the trainings at hand** is over draws alone, and its verdict stands in brackets where it differs. With \
+fewer than {LEAST} trainings there is no other. {ONE_RECORDING}
 - "Comparable" has no margin in the paper; here it is {COMPARABLE:.0%} of ReplayIRL's value to either side.
 - Time and path are compared over the agents that every controller brought home without a collision; over each one's \
 own successes a fragile controller would keep only the short trips. Claim f2 takes everybody, time-outs with the time \
