@@ -8,11 +8,13 @@ import pytest
 from agents import METHOD_VALUES, experiment_table, roster_of, rows_of, table_of
 
 from socialnav_mj.recordings import Recording
-from socialnav_mj.studies.claims import CLAIMS
-from socialnav_mj.studies.findings import examine, verdict_of, verdict_of_all
+from socialnav_mj.report.intervals import Components, interval_of
+from socialnav_mj.report.power import minimum_draws, resolved
+from socialnav_mj.studies.claims import CLAIMS, SCENARIOS
+from socialnav_mj.studies.findings import _would_take, examine, verdict_of, verdict_of_all
 from socialnav_mj.studies.held_out import HELD_OUT, IN_SAMPLE, VALIDATION, period_of_people
 from socialnav_mj.studies.panel import COMMON, MIXED, POTENTIAL_FIELD, REPLAY_IRL, Entry, Term, make_panel
-from socialnav_mj.studies.paper.claims_page import claims_page
+from socialnav_mj.studies.paper.claims_page import claims_page, to_decide
 
 SEEDS = (0, 1, 2)
 
@@ -84,11 +86,44 @@ def test_page_gives_rule_verdicts_effects_and_the_weakest_comparison_of_each_var
     )
     assert "Command: `run it`" in page and "**fails** if at least one fails" in page
     row = next(line for line in page.splitlines() if line.startswith("| (a) "))
-    assert row.endswith("| holds | fails |")
+    assert row.endswith("| holds | fails | - |")
     weakest = next(line for line in page.splitlines() if line.startswith("| variant | fails "))
     assert "scenario_3: hybrid - potential field | -0.05" in weakest
     assert all(claim.sentence in page for claim in CLAIMS)
     assert "they say nothing about another crowd" in page
+
+
+def test_undecided_claim_says_what_would_decide_it():
+    values = changed("mix", "success", [0.61, 0.71, 0.81, 0.91])
+    found = examine(make_panel(experiment_table(values, noise=0.06), roster_of(SEEDS)))
+    assert all(f.would_take is None for f in found if f.verdict != "undecided")
+    claim = found[0]
+    draws, trainings = claim.would_take
+    assert draws >= 4 and trainings >= 3
+    page = claims_page({"default": found}, titles={"default": "default"}, command="run it")
+    row = next(line for line in page.splitlines() if line.startswith("| (a) "))
+    assert row.endswith(f"| {to_decide(claim)} |") and to_decide(claim) == f"{draws:,} draws x {trainings:,} trainings"
+    assert f"To decide: {to_decide(claim)}." in page
+    table = experiment_table(values, noise=0.06, scenarios=("scenario_1",))
+    assert to_decide(examine(make_panel(table, roster_of(SEEDS)))[0]) == "the comparisons not run"
+
+
+def test_one_comparison_against_a_claim_decides_it_and_else_all_have_to():
+    easy = resolved(Components(draw=1.0, training=0.0, cell=0.0), 0.9, trained=False)
+    hard = resolved(Components(draw=1.0, training=0.0, cell=0.0), 0.3, trained=False)
+    for_it, against = (interval_of(sign + np.array([[0.0], [1.0], [2.0]])) for sign in (0.0, -3.0))
+    assert _would_take([(easy, for_it), (hard, for_it)]) == (minimum_draws(1.0, 0.3), 0)
+    assert _would_take([(easy, against), (hard, for_it)]) == (minimum_draws(1.0, 0.9), 0)
+    assert _would_take([]) is None
+
+
+def test_claims_about_the_same_agents_count_them():
+    found = {f.claim.key: f for f in examine(make_panel(experiment_table(noise=0.002), roster_of(SEEDS)))}
+    assert found["a"].same_agents == {} and list(found["f1"].same_agents) == list(SCENARIOS)
+    count, total = found["f1"].same_agents["scenario_1"]
+    assert total == 4 * 40 and 0.45 * total < count < 0.52 * total  # half of them succeed under the weakest controller
+    page = claims_page({"default": list(found.values())}, titles={"default": "default"}, command="run it")
+    assert f"brought home: scenario_1 {count} of 160 ({count / 160:.0%}".replace("%", " %") in page
 
 
 def small_panel():

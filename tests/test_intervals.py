@@ -10,7 +10,8 @@ from interval_coverage import BEGIN, CASES, END, PAGE, TRAININGS, coverage, mark
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from socialnav_mj.report.intervals import Components, combined, components_of, interval_of, reach
+from socialnav_mj.report.intervals import LEAST, Components, combined, components_of, interval_of, reach
+from socialnav_mj.report.power import MOST_DRAWS, MOST_TRAININGS, fewest, minimum_draws, resolved, sizes, told_size
 
 CROSSED = np.array([[1.0, 2.0, 6.0], [2.0, 5.0, 5.0], [3.0, 2.0, 1.0], [6.0, 7.0, 8.0]])
 """Means of rows 3, 4, 2, 7 and of columns 3, 4, 5 around 4."""
@@ -133,6 +134,34 @@ def test_components_add_up_to_the_variance_of_the_mean():
     half = 0.5 * (interval.high - interval.low)
     assert reach(parts, np.array([4]), np.array([3])) == pytest.approx([half])
     assert components_of(np.arange(4.0)[:, None]) == Components(draw=pytest.approx(5.0 / 3.0), training=0.0, cell=0.0)
+
+
+def test_expected_reach_without_trainings_is_the_one_of_the_draws_command():
+    parts = Components(draw=0.08**2, training=0.0, cell=0.0)
+    n = minimum_draws(0.08, 0.05)
+    found = fewest(resolved(parts, 0.05, trained=False), draws=3, trainings=0)
+    assert found == (n, 0) and told_size(found) == f"{n} draws"
+
+
+def test_fewest_is_the_smallest_study_that_resolves_and_no_smaller_than_the_one_at_hand():
+    parts = Components(draw=0.03**2, training=0.03**2, cell=0.05**2)
+    resolves = resolved(parts, 0.03, trained=True)
+    draws, trainings = fewest(resolves, draws=10, trainings=3)
+    assert float(reach(parts, np.array(draws), np.array(trainings))) < 0.03
+    for d in range(10, 200):
+        for t in range(3, 60):
+            if d * t < draws * trainings:
+                assert float(reach(parts, np.array(d), np.array(t))) >= 0.03, (d, t)
+    assert fewest(resolves, draws=60, trainings=30) == (60, 30)
+
+
+def test_what_no_study_would_tell_is_told_as_such():
+    parts = Components(draw=1.0, training=1.0, cell=0.0)
+    assert fewest(resolved(parts, 1e-3, trained=True), draws=10, trainings=3) is None
+    assert told_size(None) == "> 100,000 draws" and told_size((1200, 12)) == "1,200 draws x 12 trainings"
+    for most in (MOST_DRAWS, MOST_TRAININGS):
+        tried = sizes(most)
+        assert tried[0] == LEAST and tried[-1] == most and np.all(np.diff(tried) > 0)
 
 
 def test_truth_of_the_made_studies_is_what_they_say():

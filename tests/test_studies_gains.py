@@ -10,7 +10,6 @@ from toy_policies import write_toy
 from socialnav_mj.cli import main
 from socialnav_mj.controllers import make_controller
 from socialnav_mj.report import style
-from socialnav_mj.studies import intervals
 from socialnav_mj.studies.gains.ranges import OF_THE_FIELD, sweep_of
 from socialnav_mj.studies.gains.study import FORMS, RANGES, GainSweep
 from socialnav_mj.studies.panel import CAPPED, POTENTIAL_FIELD
@@ -21,7 +20,6 @@ TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(intervals, "N_RESAMPLES", 99)
     monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
 
 

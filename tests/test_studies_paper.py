@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from socialnav_mj.controllers import make_controller
 from socialnav_mj.episode import EpisodeError
 from socialnav_mj.report import style
 from socialnav_mj.report.agents import Results
+from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.files import publish
 from socialnav_mj.studies.paper.outputs import PUBLIC, agents_of, write_outputs
@@ -169,6 +171,13 @@ def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsy
         "switch_distance.csv",
     }
     page = (public / "README.md").read_text()
+    assert ONE_RECORDING in page and " claims are undecided. *To decide*: " in page
+    (heading,) = (
+        line for line in page.splitlines() if line.startswith("| scenario | controller | success | hit first")
+    )
+    assert heading.endswith("| same agents |")
+    found = re.findall(r"\| (\d+) of (\d+)(?: \(\d+ %\))? \|$", page, flags=re.MULTILINE)
+    assert len(found) == 2 * 4 and all(int(count) <= int(total) for count, total in found)
     linked = [part.split(")")[0] for part in page.split("](")[1:]]
     assert len(linked) >= 7 and all((public / name).is_file() for name in linked)
 

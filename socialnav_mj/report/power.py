@@ -1,4 +1,4 @@
-"""How many draws it takes to see a difference."""
+"""How many draws, and trainings, it takes to see a difference."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,15 +6,17 @@ from itertools import combinations
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, Columns, draw_means, groups, measured
-from socialnav_mj.report.intervals import CONFIDENCE
+from socialnav_mj.report.intervals import CONFIDENCE, LEAST, Components, reach
 
 TARGETS = {col.SUCCESS: 0.05, col.TIME_UNDER_WAY: 1.0, col.INTRUSION_SHARE: 0.05, col.MINIMUM_DISTANCE: 0.05}
 """Measures and the differences that the report asks for, in the measure's unit."""
 MOST_DRAWS = 100_000
+MOST_TRAININGS = 1_000
 
 
 def minimum_draws(
@@ -60,6 +62,56 @@ def minimum_draws(
     return high
 
 
+def sizes(most: int) -> NDArray[np.int64]:
+    """Numbers of draws, or of trainings, that are tried.
+
+    Args:
+        most: The greatest, a power of ten >= 100.
+
+    Returns:
+        `intervals.LEAST` and all that follow to 100, then those of two digits and zeros.
+    """
+    digits, rounded = np.arange(11, 101), [10**k for k in range(1, round(np.log10(most)) - 1)]
+    return np.concatenate([np.arange(LEAST, 101), *(digits * ten for ten in rounded)])
+
+
+def resolved(components: Components, difference: float, *, trained: bool) -> NDArray[np.bool_]:
+    """Whether studies of many sizes would tell a difference from 0, were it as large as the one at hand.
+
+    Args:
+        components: Of the study at hand.
+        difference: Its mean, of either sign.
+        trained: Whether there are trainings.
+
+    Returns:
+        For every one of `sizes(MOST_DRAWS)` (rows) and `sizes(MOST_TRAININGS)` (columns; one column if nothing learns)
+        whether the interval is expected to leave out 0.
+    """
+    trainings = sizes(MOST_TRAININGS) if trained else np.ones(1, dtype=np.int64)
+    return np.asarray(reach(components, sizes(MOST_DRAWS)[:, None], trainings) < abs(difference))
+
+
+def fewest(resolves: NDArray[np.bool_], *, draws: int, trainings: int) -> tuple[int, int] | None:
+    """The size with the fewest episodes, draws times trainings, that does not fall short of the study at hand.
+
+    Args:
+        resolves: Of `resolved`, or of several together.
+        draws: Of the study at hand.
+        trainings: Likewise; 0 if nothing learns.
+
+    Returns:
+        Draws and trainings (0 if nothing learns); None if no size of the table will do.
+    """
+    rows = sizes(MOST_DRAWS)
+    columns = sizes(MOST_TRAININGS) if trainings else np.ones(1, dtype=np.int64)
+    allowed = resolves & (rows >= draws)[:, None] & (columns >= trainings)
+    if not allowed.any():
+        return None
+    episodes = np.where(allowed, rows[:, None] * columns, np.inf)
+    row, column = np.unravel_index(int(episodes.argmin()), episodes.shape)
+    return int(rows[row]), int(columns[column]) if trainings else 0
+
+
 @dataclass(frozen=True, kw_only=True)
 class Resolution:
     """What a run says about how many draws two controllers need to be told apart by one measure."""
@@ -91,6 +143,21 @@ def told(draws: int | None) -> str:
         Such as "12", or "> 100,000".
     """
     return f"> {MOST_DRAWS:,}" if draws is None else str(draws)
+
+
+def told_size(size: tuple[int, int] | None) -> str:
+    """A number of draws and trainings as text.
+
+    Args:
+        size: Of `fewest`.
+
+    Returns:
+        Such as "40 draws x 12 trainings", or "> 100,000 draws".
+    """
+    if size is None:
+        return f"{told(None)} draws"
+    draws, trainings = size
+    return f"{draws:,} draws" + (f" x {trainings:,} trainings" if trainings else "")
 
 
 def resolutions(agents: pa.Table, targets: dict[str, float] | None = None) -> list[Resolution]:

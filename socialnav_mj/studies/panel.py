@@ -128,6 +128,18 @@ class Panel:
                 total += term.factor * of_draws
         return total
 
+    def same_agents(self, scenario: str) -> tuple[int, int]:
+        """How many agents the measures with `COMMON` are about.
+
+        Args:
+            scenario: Name of a task.
+
+        Returns:
+            Agents that every controller brought home without a collision, and all that count.
+        """
+        kept = self.kept[scenario]
+        return int(np.sum(kept & self.common[scenario])), int(np.sum(kept))
+
     def values(self, method: str, scenario: str, measure: str, training: int | None) -> tuple[Array, Array]:
         """A measure of every agent, and the agent's weight within its draw.
 

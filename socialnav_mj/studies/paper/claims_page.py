@@ -5,9 +5,15 @@ from math import isnan
 
 from socialnav_mj.report.intervals import LEAST, ONE_RECORDING, Interval
 from socialnav_mj.report.markdown import bounds, head, row
+from socialnav_mj.report.power import told_size
 from socialnav_mj.studies.claims import COMPARABLE, Part
 from socialnav_mj.studies.findings import Finding, Verdict
 
+WOULD_TAKE = """\
+*To decide*: the draws and trainings, at least as many as here and with the fewest episodes in all, at which the \
+interval is expected to leave out 0, were every difference as large as the one found.
+"""
+"""What stands in the column."""
 _RULE = f"""\
 - A claim is a list of comparisons, each a mean difference turned so that the claim says "greater than 0".
 - A comparison **holds** if its 95 % interval lies above 0, **fails** if it lies below 0, and is **undecided** if the \
@@ -42,20 +48,53 @@ def claims_page(findings: Mapping[str, Sequence[Finding]], *, titles: Mapping[st
     names = list(findings)
     default = findings[names[0]]
     lines = ["# The paper's claims", "", f"Command: `{command}`", "", "## Verdicts", ""]
-    lines += head(["claim", "the paper says", *(titles[name] for name in names)])
+    lines += head(["claim", "the paper says", *(titles[name] for name in names), f"to decide, {titles[names[0]]}"])
     for place, finding in enumerate(default):
         verdicts = [_verdict(findings[name][place]) for name in names]
-        lines.append(row([f"({finding.claim.key})", finding.claim.sentence, *verdicts]))
+        lines.append(row([f"({finding.claim.key})", finding.claim.sentence, *verdicts, to_decide(finding)]))
+    lines += ["", WOULD_TAKE.rstrip()]
     lines += ["", "## How a verdict comes about", "", _RULE]
     for place, finding in enumerate(default):
         lines += _section(finding, {name: findings[name][place] for name in names[1:]}, titles)
     return "\n".join(lines) + "\n"
 
 
+def to_decide(finding: Finding) -> str:
+    """What it would take to decide a claim.
+
+    Args:
+        finding: Of the claim.
+
+    Returns:
+        "-" if it is decided; "the comparisons not run" if there are any.
+    """
+    if finding.verdict != "undecided":
+        return "-"
+    return "the comparisons not run" if finding.missing else told_size(finding.would_take)
+
+
+def share_of(count: int, total: int) -> str:
+    """A number of agents as text.
+
+    Args:
+        count: Some of them.
+        total: All.
+
+    Returns:
+        Such as "177 of 430 (41 %)".
+    """
+    return f"{count} of {total}" + (f" ({count / total:.0%})".replace("%", " %") if total else "")
+
+
 def _section(finding: Finding, others: Mapping[str, Finding], titles: Mapping[str, str]) -> list[str]:
     claim = finding.claim
     lines = [f"## ({claim.key}) {claim.sentence}", "", f"Test: {claim.test} [{claim.unit}].", ""]
     lines += [f"Default setting: **{_verdict(finding)}**.", ""]
+    if finding.verdict == "undecided":
+        lines += [f"To decide: {to_decide(finding)}.", ""]
+    if finding.same_agents:
+        counts = (f"{name} {share_of(*count)}" for name, count in finding.same_agents.items())
+        lines += [f"Agents that every controller brought home: {', '.join(counts)}.", ""]
     lines += head(["comparison", "effect", "95 % interval", "for the trainings at hand", "verdict", "draws"])
     for part, interval, verdict in finding.parts:
         given = bounds(interval.low_given, interval.high_given, sign="+")

@@ -19,7 +19,7 @@ from socialnav_mj.studies.findings import Finding, examine
 from socialnav_mj.studies.held_out import held_out_levels, period_of_people
 from socialnav_mj.studies.levels import Level, LevelTable, levels
 from socialnav_mj.studies.panel import MIXED, make_panel
-from socialnav_mj.studies.paper.claims_page import claims_page
+from socialnav_mj.studies.paper.claims_page import claims_page, to_decide
 from socialnav_mj.studies.paper.figures import draw_figures, draw_sweep
 from socialnav_mj.studies.paper.page import experiment_page
 from socialnav_mj.studies.paper.plan import (
@@ -183,6 +183,7 @@ def _claim_rows(variant: str, findings: Sequence[Finding]) -> list[dict[str, Any
             "unit": finding.claim.unit,
             **asdict(interval),
             "verdict": verdict,
+            "claim_to_decide": to_decide(finding),
         }
         for finding in findings
         for part, interval, verdict in finding.parts

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import head, row
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.files import traceability
@@ -10,6 +11,7 @@ from socialnav_mj.studies.findings import Finding
 from socialnav_mj.studies.levels import Level, LevelTable
 from socialnav_mj.studies.looks import LOOKS, SCENARIO_TITLES
 from socialnav_mj.studies.panel import COMMON, METHODS, MIXED, POTENTIAL_FIELD
+from socialnav_mj.studies.paper.claims_page import WOULD_TAKE, share_of, to_decide
 from socialnav_mj.studies.paper.figures import FIGURES
 from socialnav_mj.studies.paper.plan import DEFAULT
 from socialnav_mj.studies.paper.training_curves import training_table
@@ -28,13 +30,14 @@ _COLUMNS = (
     ("path ratio, own successes", "distance_to_displacement_success", 3),
     ("success if ghosts count", "success_if_ghosts_count", 3),
 )
-_HOW_TO_READ = """\
+_HOW_TO_READ = f"""\
 Means over draws (a draw is one random choice of the people who are replaced) and training seeds. Brackets, and the \
 bars of the figures: 95 % interval for other draws and other trainings, see claims.md. White dots: each training \
-alone. *Same agents*: those that every controller brought home without a collision. *Censored*: everybody who spawned; \
-who did not arrive counts with the time watched, a lower bound. *Human*: each replaced person on its own \
-track, scored by the same code; contacts by geometry. *(x n)*: n times the potential \
-field's. All numbers with their intervals: tables/levels.csv.
+alone. {ONE_RECORDING} *Same agents*: those that every controller brought home without a collision, so the easy trips; \
+the last column counts them (*human*: those whose person had no collision either). *Censored*: everybody who spawned; \
+who did not arrive counts with the time watched, a lower bound. *Human*: each replaced person on its own track, scored \
+by the same code; contacts by geometry. *(x n)*: n times the potential field's. All numbers with their intervals: \
+tables/levels.csv.
 """
 _HELD_OUT = """\
 Agents by when the person they replace appears: in the part of the recording that the policies were trained on, or \
@@ -78,9 +81,11 @@ def experiment_page(
     recording = provenance["recording"]
     lines = [f"# The paper's study on {recording['name']} ({recording['variant']})", ""]
     lines += [f"Command: `{provenance['command']}`", "", "## Claims of the paper, default setting", ""]
-    lines += head(["claim", "the paper says", "verdict"])
-    lines += [row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**"]) for f in findings]
-    lines += ["", "Effects, intervals, other settings and the rule: [claims.md](claims.md).", "", "## Results", ""]
+    lines += head(["claim", "the paper says", "verdict", "to decide"])
+    lines += [row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**", to_decide(f)]) for f in findings]
+    undecided = sum(f.verdict == "undecided" for f in findings)
+    lines += ["", f"{undecided} of {len(findings)} claims are undecided. {WOULD_TAKE}"]
+    lines += ["Effects, intervals, other settings and the rule: [claims.md](claims.md).", "", "## Results", ""]
     lines += [_HOW_TO_READ, *_results(table)]
     for drawing in FIGURES:
         lines += [f"![{drawing.name}](figures/{drawing.name}.png)", ""]
@@ -106,7 +111,7 @@ def experiment_page(
 
 
 def _results(table: LevelTable) -> list[str]:
-    lines = head(["scenario", "controller", *(heading for heading, _, _ in _COLUMNS)])
+    lines = head(["scenario", "controller", *(heading for heading, _, _ in _COLUMNS), "same agents"])
     for scenario in table.scenarios:
         for method in METHODS:
             found = [(table.find(scenario, method, measure), digits) for _, measure, digits in _COLUMNS]
@@ -116,8 +121,18 @@ def _results(table: LevelTable) -> list[str]:
             cells[0] = interval_cell(found[0][0])
             cells[1] += f" / {mean_cell(table.find(scenario, method, 'first_hit_agent'), 3)}"
             cells[4] += _times(found[4][0], table.find(scenario, POTENTIAL_FIELD, "intrusion_share_of_steps"))
-            lines.append(row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells]))
+            lines.append(row([SCENARIO_TITLES.get(scenario, scenario), LOOKS[method].label, *cells, _same(found)]))
     return [*lines, ""]
+
+
+def _same(found: Sequence[tuple[Level | None, int]]) -> str:
+    """How many agents the columns of the same agents are about, of one training."""
+    by_measure = {measure: level for (_, measure, _), (level, _) in zip(_COLUMNS, found, strict=True)}
+    everybody, same = by_measure["success"], by_measure[f"completion_time_success{COMMON}"]
+    if everybody is None or same is None:
+        return "-"
+    trainings = max(everybody.interval.n_trainings, 1)
+    return share_of(same.n_values // trainings, everybody.n_values // trainings)
 
 
 def _trainings(table: LevelTable) -> list[str]:
