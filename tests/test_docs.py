@@ -144,6 +144,7 @@ def test_options_in_the_text_are_those_of_a_command(capsys):
         [name] for name in ("evaluate", "report", "verify", "draws", "bench", "train", "ship", "reproduce")
     ] + [
         ["leave-one-out"],
+        ["step-size"],
         ["data", "list"],
         ["data", "info"],
         ["data", "fetch"],

@@ -10,7 +10,7 @@ from dm_control.rl.control import PhysicsError
 
 from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import errors, say
-from socialnav_mj.cli.cost import Bench
+from socialnav_mj.cli.cost import Bench, StepSize
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
 from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce, Ship, Train
 from socialnav_mj.processes import stoppable
@@ -23,6 +23,7 @@ Command = (
     | Annotated[List, tyro.conf.subcommand("list")]
     | Annotated[Data, tyro.conf.subcommand("data")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
+    | Annotated[StepSize, tyro.conf.subcommand("step-size")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Ship, tyro.conf.subcommand("ship")]
     | Annotated[FitPrediction, tyro.conf.subcommand("fit-prediction")]

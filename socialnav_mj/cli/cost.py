@@ -1,4 +1,4 @@
-"""The sub-command `bench`: what an episode costs beside the bare physics."""
+"""The sub-commands `bench` and `step-size`: what the physics costs, and how much hangs on its step."""
 
 import json
 import shlex
@@ -11,7 +11,54 @@ import tyro
 from rich.table import Table
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
-from socialnav_mj.cli.console import console, errors
+from socialnav_mj.cli.console import console, errors, follow, say
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepSize:
+    """Run the same agents at several physics steps, and among people a micrometre wider: what changes?
+
+    If it is interrupted, repeat the command to resume it.
+    """
+
+    dataset: str = "students003"
+    """Name in the catalogue, or path of a recording."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    scenarios: Scenarios = (1,)
+    """Scenarios to run."""
+    controllers: tuple[str, ...] = ("potential_field", "replay_irl")
+    """As in `evaluate`."""
+    draws: int = 10
+    """Random choices of the replaced people."""
+    seed: int = 0
+    """Number of the first draw; the others count up from it."""
+    steps: tuple[float, ...] = (0.01, 0.005, 0.0025)
+    """Physics steps, the one to compare with first [s]."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    out: Path = Path("runs/step_size")
+    """Folder of the results."""
+
+    def run(self) -> None:
+        """Run what is missing behind a bar, and print the table as Markdown."""
+        from socialnav_mj.controllers import with_policy_of
+        from socialnav_mj.evaluation import Evaluation
+        from socialnav_mj.studies import step_size
+
+        evaluation = Evaluation(
+            dataset=self.dataset,
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            controllers=tuple(with_policy_of(spec, self.dataset) for spec in self.controllers),
+            draws=self.draws,
+            seed=self.seed,
+        )
+        planned = step_size.evaluations(evaluation, self.steps)
+        follow(
+            step_size.run(planned, self.out, command=shlex.join(sys.argv), n_jobs=self.jobs), step_size.jobs(planned)
+        )
+        say(step_size.step_table(step_size.compare(planned, self.out, n_jobs=self.jobs)).rstrip())
 
 
 @dataclass(frozen=True, kw_only=True)
