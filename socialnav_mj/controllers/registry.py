@@ -13,6 +13,7 @@ from socialnav_mj.controllers.dynamic_window import DynamicWindow
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.mpc import MPC
+from socialnav_mj.controllers.orca import ORCA
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
 from socialnav_mj.controllers.social_force import SocialForce
@@ -26,6 +27,7 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "hybrid": Hybrid,
     "go_straight": GoStraight,
     "social_force": SocialForce,
+    "orca": ORCA,
     "dynamic_window": DynamicWindow,
     "mpc": MPC,
 }
