@@ -9,7 +9,7 @@ from test_controllers import LIMITS, observation, twist_of
 from test_protocol import Walks, actions
 from test_robot import World
 
-from socialnav_mj.controllers import Limits, make_controller
+from socialnav_mj.controllers import Limits, controller_config, controller_of, make_controller
 from socialnav_mj.controllers.mpc import MPC, PRESETS
 from socialnav_mj.controllers.planning import loops
 from socialnav_mj.controllers.planning.arrays import plan_costs
@@ -161,7 +161,7 @@ def test_loops_are_right_without_the_compiler_too():
     np.testing.assert_array_equal(found, plan_costs(*problem))
 
 
-def test_an_episode_is_the_same_with_and_without_numba(monkeypatch):
+def test_wheel_speeds_are_the_same_bits_with_and_without_numba(monkeypatch):
     pytest.importorskip("numba")
     walks = Walks.made(5, n=8, m=12)
     fast = actions("mpc", walks)
@@ -281,6 +281,21 @@ def test_foresight_reckons_with_the_nearest_only():
     assert ahead.person[0].tolist() == [False] + [True] * (MOST_NEIGHBOURS - 1)
 
 
+def test_foresight_expects_agents_to_keep_their_velocity_and_people_to_go_on_changing_it():
+    """Somebody and an agent, both seen to slow down by 0.2 m/s a step."""
+    foresight = Foresight(load_prediction("linear", steps=16), LIMITS, steps=16)
+    x = np.array([2.0, 3.0])
+    for speed in (1.0, 0.8, 0.6):
+        seen = observation(pedestrians=[(x[0], 1.0)], agents=[(x[1], -1.0)])
+        seen["pedestrian_velocity"][0, 0] = seen["agent_velocity"][0, 1] = (speed, 0.0)
+        ahead = foresight.look(seen)
+        x += 0.2 * (speed - 0.2)
+    moved = ahead.path[0, :, :, 0] - ahead.path[0, 0, :, 0]
+    assert ahead.person[0].tolist() == [True, False]
+    np.testing.assert_allclose(moved[:, 1], STEP * 0.6 * np.arange(17), atol=1e-12)
+    assert (moved[1:, 0] < moved[1:, 1] - 0.005).all()
+
+
 # Behaviour
 
 
@@ -304,6 +319,7 @@ def test_presets_are_weights_and_a_weight_that_is_given_stays():
         controller = make_controller(f"mpc(preset={preset!r})")
         assert (controller.person_weight, controller.agent_weight, controller.zone_weight) == weights
         assert controller.name == f"mpc(preset={preset!r})"
+        assert controller_of(controller_config(controller)) == controller
     mixed = make_controller("mpc(preset='calm', zone_weight=0.5)")
     assert (mixed.person_weight, mixed.zone_weight) == (PRESETS["calm"][0], 0.5)
 

@@ -3,6 +3,7 @@
 from socialnav_mj.controllers.base import Controller, Limits, Observation, TwistController
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
+from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.registry import BUILT_IN, available, class_path, make_controller
 from socialnav_mj.controllers.replay_irl import ReplayIRL
@@ -10,6 +11,7 @@ from socialnav_mj.controllers.specs import controller_config, controller_of, spe
 
 __all__ = [
     "BUILT_IN",
+    "MPC",
     "Controller",
     "GoStraight",
     "Hybrid",

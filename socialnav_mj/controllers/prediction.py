@@ -48,11 +48,12 @@ class Prediction:
         """
         if steps > len(self.coefficients):
             raise ValueError(f"steps = {steps} is not allowed; allowed: at most {len(self.coefficients)}")
-        # One sum after the other: a matrix product would leave their order to BLAS.
-        moved = np.zeros((*velocity.shape[:-2], steps, 2))
-        for lag in range(len(LAGS)):
-            moved = moved + self.coefficients[:steps, lag, None] * velocity[..., None, lag, :]
-        return moved
+        # One sum after the other: a matrix product would leave their order to BLAS. The last axis is that of the steps,
+        # since numpy is slow along short ones.
+        along = np.zeros((*velocity.shape[:-2], 2, steps))
+        for lag in np.flatnonzero(self.coefficients.any(axis=0)):
+            along += velocity[..., lag, :, None] * self.coefficients[:steps, lag]
+        return along.swapaxes(-1, -2)
 
 
 def constant_velocity(steps: int) -> Prediction:

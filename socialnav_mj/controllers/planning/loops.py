@@ -121,18 +121,24 @@ def loop_costs(
     n, p, _ = plans.shape
     steps, others = len(terms.margin), crowd.contact.shape[1]
     costs, clearances = np.full((n, p), np.inf), np.full((n, p), np.inf)
-    near, count, worst = np.empty((steps, others), dtype=np.int64), np.empty(steps, dtype=np.int64), np.empty(others)
+    near, count = np.empty((steps, others), dtype=np.int64), np.empty(steps, dtype=np.int64)
+    cut, worst = np.empty((steps, others)), np.empty(others)
     for i in range(n):
-        fastest = _larger(abs(speed[i]), terms.max_speed)
+        stride = _larger(abs(speed[i]), terms.max_speed) * terms.step + 1e-6
         for k in range(steps):
             count[k] = 0
             for j in range(others):
-                least = closest(crowd.x[i, k, j], crowd.y[i, k, j], crowd.x[i, k + 1, j], crowd.y[i, k + 1, j])
+                if crowd.clearance_weight[i, j] <= 0.0 and crowd.zone_weight[i, j] <= 0.0:
+                    continue
+                x, y = crowd.x[i, k, j], crowd.y[i, k, j]
+                dx, dy = crowd.x[i, k + 1, j] - x, crowd.y[i, k + 1, j] - y
                 range_ = crowd.contact[i, j] + terms.margin[k]
                 if crowd.zone_weight[i, j] > 0.0:
                     range_ = _larger(range_, terms.zone)
-                counts = crowd.clearance_weight[i, j] > 0.0 or crowd.zone_weight[i, j] > 0.0
-                if counts and least <= range_ + fastest * (k + 1) * terms.step + 1e-6:
+                # Who is farther away than this when a step begins is out of range until it ends.
+                distance = range_ + stride + _root(dx * dx + dy * dy)
+                if _root(x * x + y * y) <= distance + stride * k:
+                    cut[k, j] = distance * distance
                     near[k, count[k]] = j
                     count[k] += 1
         for q in range(p):
@@ -161,23 +167,21 @@ def loop_costs(
                 weighted = 0.0
                 for m in range(count[k]):
                     j = near[k, m]
-                    distance = closest(
-                        crowd.x[i, k, j] - x,
-                        crowd.y[i, k, j] - y,
-                        crowd.x[i, k + 1, j] - next_x,
-                        crowd.y[i, k + 1, j] - next_y,
-                    )
+                    from_x, from_y = crowd.x[i, k, j] - x, crowd.y[i, k, j] - y
+                    if from_x * from_x + from_y * from_y > cut[k, j]:
+                        continue
+                    distance = closest(from_x, from_y, crowd.x[i, k + 1, j] - next_x, crowd.y[i, k + 1, j] - next_y)
                     lack = terms.clearance_decay[k] * lacking(distance, crowd.contact[i, j], terms.margin[k], terms)
-                    worst[j] = _larger(worst[j], crowd.clearance_weight[i, j] * lack)
+                    lack = crowd.clearance_weight[i, j] * lack
+                    if lack > worst[j]:
+                        total, most = total + (lack - worst[j]), _larger(most, lack)
+                        worst[j] = lack
                     weighted = weighted + crowd.zone_weight[i, j] * inside(distance, terms)
                 within = within + weighted * terms.zone_time[k]
                 x, y = next_x, next_y
                 to_x, to_y = goal[i, 0] - x, goal[i, 1] - y
                 time = (k + 1) * terms.step
                 remaining = _root(to_x * to_x + to_y * to_y)
-                total, most = 0.0, 0.0
-                for j in range(others):
-                    total, most = total + worst[j], _larger(most, worst[j])
                 if remaining <= terms.arrival_distance:
                     arrived = True
                     break
@@ -192,6 +196,9 @@ def loop_costs(
             if not arrived:
                 error = bearing(cosine * to_y - sine * to_x, cosine * to_x + sine * to_y)
                 facing = terms.heading_weight * abs(error)
+            total = 0.0
+            for j in range(others):
+                total = total + worst[j]
             clearance = 0.5 * (total + most)
             cost = time + (remaining - terms.arrival_distance) / terms.max_speed + facing + clearance + within
             costs[i, q], clearances[i, q] = cost, clearance
@@ -224,4 +231,7 @@ def compiled() -> Callable[..., tuple[Array, Array]] | None:
     formulas = (sine_cosine, small_sine_cosine, bearing, yaw_command, turn_made, speed_gained, closest, lacking, inside)
     for formula in formulas:
         register_jitable(formula)
-    return numba.njit(cache=True)(loop_costs)
+    try:
+        return numba.njit(cache=True)(loop_costs)
+    except RuntimeError:  # no folder to keep it in may be written to
+        return numba.njit(loop_costs)
