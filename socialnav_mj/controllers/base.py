@@ -14,8 +14,8 @@ from socialnav_mj.geometry import Array, wheel_speed_of_twist
 Observation = Mapping[str, NDArray[Any]]
 
 IS_CONTROLLER = "is_controller"
-"""Key in the metadata of a dataclass field that holds another controller; on the command line and in an episode it is
-written as `make_controller` takes it."""
+"""Key in the metadata of a dataclass field that holds another controller, or a tuple of them; on the command line and
+in an episode they are written as `make_controller` takes them."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,10 +13,13 @@ from socialnav_mj.controllers.dynamic_window import DynamicWindow
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.mpc import MPC
+from socialnav_mj.controllers.mpdm import MPDM
 from socialnav_mj.controllers.orca import ORCA
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
+from socialnav_mj.controllers.selector import Selector
 from socialnav_mj.controllers.social_force import SocialForce
+from socialnav_mj.controllers.stand_still import StandStill
 
 ENTRY_POINT_GROUP = "socialnav_mj.controllers"
 
@@ -29,6 +32,9 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "social_force": SocialForce,
     "orca": ORCA,
     "dynamic_window": DynamicWindow,
+    "mpdm": MPDM,
+    "selector": Selector,
+    "stand_still": StandStill,
     "mpc": MPC,
 }
 
@@ -76,7 +82,7 @@ def made(kind: Callable[..., Controller], settings: dict[str, Any]) -> Controlle
 
     Args:
         kind: Class or function that makes it.
-        settings: Keyword arguments; where a field holds a controller, its spec.
+        settings: Keyword arguments; where a field holds a controller, its spec; where it holds several, theirs.
 
     Returns:
         A new controller, not yet reset.
@@ -85,8 +91,12 @@ def made(kind: Callable[..., Controller], settings: dict[str, Any]) -> Controlle
         TypeError: If the class does not take the settings.
         ValueError: If a value is not allowed.
     """
-    parts = {name: make_controller(settings[name]) for name in parts_of(kind) if name in settings}
+    parts = {name: _part(settings[name]) for name in parts_of(kind) if name in settings}
     return kind(**settings | parts)
+
+
+def _part(spec: str | list[str] | tuple[str, ...]) -> Controller | tuple[Controller, ...]:
+    return tuple(make_controller(one) for one in spec) if isinstance(spec, list | tuple) else make_controller(spec)
 
 
 def parse(spec: str) -> tuple[str, dict[str, Any]]:

@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Callable, Collection
+from functools import partial
 from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
 from typeguard import TypeCheckError, check_type
 
 from socialnav_mj.controllers.base import Controller
-from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.registry import (
     BUILT_IN,
     ENTRY_POINT_GROUP,
@@ -39,12 +39,14 @@ def with_policy_of(spec: str, dataset: str) -> str:
     """
     policy = policy_of(dataset)
     name, config = parse(spec)
-    found: dict[str, str] = {}
+    found: dict[str, Any] = {}
     if name == "replay_irl" and "policy" not in config and policy != DEFAULT_POLICY:
         found = {"policy": policy}
-    elif name == "hybrid":
-        parts = {part: config.get(part, controller_config(Hybrid())[part]) for part in parts_of(Hybrid)}
-        found = {part: own for part, old in parts.items() if (own := with_policy_of(old, dataset)) != old}
+    elif name in BUILT_IN and parts_of(BUILT_IN[name]):
+        default = controller_config(BUILT_IN[name]())
+        parts = {part: config.get(part, default[part]) for part in parts_of(BUILT_IN[name])}
+        own = {part: _each(old, partial(with_policy_of, dataset=dataset)) for part, old in parts.items()}
+        found = {part: new for part, new in own.items() if new != parts[part]}
     if not found:
         return spec
     return _text(name, config | found)
@@ -68,7 +70,8 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     for name in (field.name for field in settings_of(kind)):
         value = getattr(controller, name)
         try:
-            result[name] = spec_of(value) if name in parts_of(kind) else json.loads(json.dumps(value, allow_nan=False))
+            is_part = name in parts_of(kind)
+            result[name] = _each(value, spec_of) if is_part else json.loads(json.dumps(value, allow_nan=False))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{result['class']}.{name} = {value!r} is not allowed; allowed: JSON values") from error
     return result
@@ -176,11 +179,11 @@ def _check_values(path: str, kind: Callable[..., Controller], values: dict[str, 
             known = ", ".join(allowed) or "none"
             raise ValueError(f"controller {path!r} has no setting {name!r}; allowed: {known}")
         try:
-            check_type(value, str if name in parts_of(kind) else hints[name])
+            check_type(value, str | list[str] if name in parts_of(kind) else hints[name])
         except TypeCheckError as error:
             raise ValueError(f"controller {path!r}: {name} = {value!r} is not allowed: {error}") from error
         if name in parts_of(kind):
-            _check_trusted_spec(value, trusted)
+            _each(value, partial(_check_trusted_spec, trusted=trusted))
 
 
 def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
@@ -190,7 +193,12 @@ def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
     factory = factory_of(name)
     for part in parts_of(factory):
         if part in config:
-            _check_trusted_spec(config[part], trusted)
+            _each(config[part], partial(_check_trusted_spec, trusted=trusted))
+
+
+def _each(part: Any, function: Callable[[Any], Any]) -> Any:
+    """A function of one part, or the list of it for several."""
+    return [function(one) for one in part] if isinstance(part, list | tuple) else function(part)
 
 
 def _untrusted(path: str) -> str:

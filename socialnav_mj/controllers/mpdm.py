@@ -1,0 +1,152 @@
+"""`mpdm`: multi-policy decision making, the choice among policies by rolling each of them out.
+
+Cunningham et al. 2015, doi 10.1109/ICRA.2015.7139412; for robots among people Mehta et al. 2016, doi
+10.1109/IROS.2016.7759205.
+"""
+
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialnav_mj.controllers.base import IS_CONTROLLER, Limits, Observation, TwistController
+from socialnav_mj.controllers.planning.foresight import Foresight
+from socialnav_mj.controllers.planning.imagination import Imagination, clipped
+from socialnav_mj.controllers.planning.loops import inside, lacking
+from socialnav_mj.controllers.planning.terms import Terms, terms_of
+from socialnav_mj.controllers.potential_field import PotentialFieldCapped
+from socialnav_mj.controllers.prediction import Prediction, load_prediction
+from socialnav_mj.controllers.replay_irl import ReplayIRL
+from socialnav_mj.controllers.social_force import SocialForce
+from socialnav_mj.controllers.stand_still import StandStill
+from socialnav_mj.geometry import Array
+
+STEPS = 12
+"""Of a roll-out, of 0.2 s each: 2.4 s; chosen on draws 0-9 of students003."""
+
+
+def _default_candidates() -> tuple[TwistController, ...]:
+    return PotentialFieldCapped(), ReplayIRL(), SocialForce(), StandStill()
+
+
+@dataclass(kw_only=True)
+class MPDM(TwistController):
+    """Rolls each candidate out in closed loop, as if it drove alone from now on, and lets the best drive the next step.
+
+    A roll-out sees the nearest others move as predicted; the candidate reacts to them, they do not react to it.
+    Candidates are to have no memory: a roll-out begins with a fresh one.
+    """
+
+    candidates: tuple[TwistController, ...] = field(default_factory=_default_candidates, metadata={IS_CONTROLLER: True})
+    """Policies to choose from, two or more."""
+    clearance_weight: float = 4.0
+    """Cost of the worst lack of clearance, >= 0 [m]."""
+    zone_weight: float = 0.5
+    """Cost of a second within 1.3 m of a person, >= 0 [m/s]."""
+    bonus: float = 0.05
+    """By which whoever drove last is cheaper, >= 0, so that equals do not alternate [m]."""
+    prediction: str = "linear"
+    """As `prediction.load_prediction` takes it."""
+    name: str = "mpdm"
+    _prediction: Prediction = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("clearance_weight", "zone_weight", "bonus"):
+            value = getattr(self, name)
+            if not (isinstance(value, (int, float)) and isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} = {value!r} is not allowed; allowed: numbers >= 0")
+        self.candidates = tuple(self.candidates)
+        if len(self.candidates) < 2 or not all(isinstance(one, TwistController) for one in self.candidates):
+            raise ValueError(
+                f"candidates = {self.candidates!r} is not allowed; allowed: two or more of TwistController"
+            )
+        self._prediction = load_prediction(self.prediction, steps=STEPS + 1)
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """Names of the candidates."""
+        return tuple(candidate.name for candidate in self.candidates)
+
+    @property
+    def active_policy(self) -> NDArray[np.int64]:
+        """Which candidate chose the last action, shape (n_agents,)."""
+        return self._acting.copy()
+
+    @property
+    def scores(self) -> Array:
+        """What each candidate's last roll-out cost, less the bonus, (n_agents, n_candidates); NaN in inactive slots."""
+        return self._scores.copy()
+
+    def reset(self, limits: Limits, *, seed: int = 0) -> None:
+        """Reset all candidates for the episode to come.
+
+        Args:
+            limits: What the robots of that episode can do.
+            seed: Given to all.
+        """
+        super().reset(limits, seed=seed)
+        self._terms: Terms = terms_of(limits, steps=STEPS)
+        self._foresight = Foresight(self._prediction, limits, steps=STEPS + 1)
+        self._imagined = [deepcopy(candidate) for candidate in self.candidates]
+        in_roll_outs = replace(limits, control_timestep=self._terms.step)
+        for candidate, imagined in zip(self.candidates, self._imagined, strict=True):
+            candidate.reset(limits, seed=seed)
+            imagined.reset(in_roll_outs, seed=seed)
+        self._seed, self._limits_ahead = seed, in_roll_outs
+        self._acting, self._person = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        self._scores = np.zeros((0, len(self.candidates)))
+
+    def twist(self, observation: Observation) -> Array:
+        """Twist of the candidate whose roll-out costs least.
+
+        Args:
+            observation: Keys as in `socialnav_mj.observation`.
+
+        Returns:
+            Shape (n_agents, 2) [m/s], [rad/s]; 0 for inactive slots.
+        """
+        active = observation["active"]
+        rows = np.flatnonzero(active)
+        ahead = self._foresight.look(observation)
+        contact = np.where(ahead.person, self.limits.contact_distance, self.limits.agent_contact_distance)
+        costs = np.full((len(active), len(self.candidates)), np.nan)
+        for k, candidate in enumerate(self._imagined):
+            candidate.reset(self._limits_ahead, seed=self._seed)
+            costs[rows, k] = self._cost(candidate, Imagination(observation, rows, ahead, self._terms), contact)
+        person = np.where(active, observation["person"], -1)
+        if len(self._person) == len(person):
+            again = np.flatnonzero(active & (self._person == person))
+            costs[again, self._acting[again]] -= self.bonus
+        self._person, self._scores = person, costs
+        self._acting = np.zeros(len(active), dtype=np.int64)
+        self._acting[rows] = costs[rows].argmin(axis=1) if rows.size else 0
+        twists = np.stack([candidate.twist(observation) for candidate in self.candidates], axis=1)
+        chosen: Array = twists[np.arange(len(active)), self._acting]
+        return chosen * active[:, None]
+
+    def _cost(self, candidate: TwistController, imagined: Imagination, contact: Array) -> Array:
+        """Of one candidate's roll-outs, shape (n,) [m]."""
+        terms = self._terms
+        real, person = imagined.real, imagined.person
+        start = np.hypot(imagined.goal[:, 0], imagined.goal[:, 1])
+        worst, zone = np.zeros(len(start)), np.zeros(len(start))
+        arrived = np.zeros(len(start), dtype=bool)
+        for k in range(STEPS):
+            twist = clipped(candidate.twist(imagined.observation()), self.limits)
+            distance = imagined.drive(twist)
+            lack = np.where(real, lacking(distance, contact, terms.margin[k], terms), 0.0)
+            near = np.where(real & person, inside(distance, terms), 0.0)
+            worst = np.where(arrived, worst, np.maximum(worst, terms.clearance_decay[k] * _greatest(lack)))
+            zone = np.where(arrived, zone, zone + terms.step * _greatest(near))
+            left = np.hypot(*(imagined.goal - imagined.position).T)
+            arrived = arrived | (left <= terms.arrival_distance)
+        left = np.where(arrived, np.minimum(left, terms.arrival_distance), left)
+        return self.clearance_weight * worst + self.zone_weight * zone - (start - left)
+
+
+def _greatest(values: Array) -> Array:
+    """Greatest value of each row, 0 where there is none."""
+    greatest: Array = values.max(axis=1, initial=0.0)
+    return greatest
