@@ -10,18 +10,20 @@ import atexit
 import json
 import os
 import random
+import select
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -60,53 +62,88 @@ def blows_of(seed: int) -> tuple[str, list[Blow]]:
         seed: Of the round.
 
     Returns:
-        Name of the command, and one to three signals for as many starts of it.
+        Name of the command, each in turn, and one to four signals for as many starts of it, most of them SIGKILL.
     """
     chance = random.Random(seed)
-    name = chance.choice([*COMMANDS])
+    name = [*COMMANDS][seed % len(COMMANDS)]
     blows = []
-    for _ in range(chance.randint(1, 3)):
-        number = signal.SIGKILL if chance.random() < 0.5 else chance.choice(SIGNALS[1:])
+    for _ in range(chance.randint(1, 4)):
+        number = signal.SIGKILL if chance.random() < 0.8 else chance.choice(SIGNALS[1:])
         change = chance.randint(1, 12) if chance.random() < 0.5 else None
         blows.append(Blow(number=number, to_all=chance.random() < 0.5, share=chance.random(), change=change))
     return name, blows
 
 
-def start(name: str, folder: Path) -> "subprocess.Popen[str]":
-    """Start a command in a process group of its own.
+class Process(Protocol):
+    """What is done with a running command, as with a `subprocess.Popen`."""
 
-    Args:
-        name: Of `COMMANDS`.
-        folder: Current folder of the command.
+    pid: int
 
-    Returns:
-        The process; its output and errors are in `log.txt` beside the folder.
-    """
+    def poll(self) -> int | None:
+        """Exit code, None while it runs."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Exit code, when it has ended."""
+
+
+class Forked:
+    """A command that a starter has forked; it leads a process group of its own."""
+
+    def __init__(self, name: str, folder: Path) -> None:
+        """Start it.
+
+        Args:
+            name: Of `COMMANDS`.
+            folder: Current folder of the command; its output and errors are in a log beside it.
+        """
+        self._idle = _starters(COMMANDS[name].imports)
+        self._starter = self._idle.pop() if self._idle else _new_starter(COMMANDS[name].imports)
+        self._starter.stdin.write(f"{name}\t{folder}\n".encode())
+        self.pid = int(self._starter.stdout.readline())
+        self._code: int | None = None
+
+    def poll(self) -> int | None:
+        """Exit code, None while it runs."""
+        with suppress(subprocess.TimeoutExpired):
+            self.wait(0.0)
+        return self._code
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end.
+
+        Args:
+            timeout: [s]; None for ever.
+
+        Returns:
+            Exit code, -N if signal N ended it.
+
+        Raises:
+            TimeoutExpired: If it runs on.
+        """
+        if self._code is None:
+            if not select.select([self._starter.stdout], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired("command", timeout or 0.0)
+            self._code = int(self._starter.stdout.readline())
+            self._idle.append(self._starter)
+        return self._code
+
+
+@lru_cache
+def _starters(imports: tuple[str, ...]) -> "list[subprocess.Popen[bytes]]":
+    """Starters that have nothing to do, by what they have imported."""
+    return []
+
+
+def _new_starter(imports: tuple[str, ...]) -> "subprocess.Popen[bytes]":
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {
-        **os.environ,
-        "PYTHONPATH": path,
-        "NO_PROXY": "127.0.0.1",
-        "no_proxy": "127.0.0.1",
-        SERVER: _server(),
-    }
-    with folder.with_name(f"{folder.name}.log").open("a") as log:
-        return subprocess.Popen(
-            [sys.executable, PROGRAM, name],
-            cwd=folder,
-            env=environment,
-            stdout=log,
-            stderr=log,
-            text=True,
-            start_new_session=True,
-            # A shell that runs this in the background makes it, and all it starts, deaf to Ctrl-C.
-            preexec_fn=_hear_everything,
-        )
-
-
-def _hear_everything() -> None:
-    for number in SIGNALS[1:]:
-        signal.signal(number, signal.SIG_DFL)
+    local = {"NO_PROXY": "127.0.0.1", "no_proxy": "127.0.0.1", SERVER: _server(), "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [sys.executable, PROGRAM, *imports],
+        env={**os.environ, "PYTHONPATH": path, **local},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        bufsize=0,
+    )
 
 
 @lru_cache(maxsize=1)
@@ -114,14 +151,17 @@ def _server() -> str:
     return serve()
 
 
-def strike(process: "subprocess.Popen[str]", blow: Blow, folder: Path, duration: float) -> None:
+def strike(process: Process, blow: Blow, folder: Path, duration: float) -> bool:
     """Wait for the moment and send the signal, unless the command has ended before; then wait for all to end.
 
     Args:
-        process: Of `start`.
+        process: Of the command.
         blow: What to send, and when.
         folder: Of the command.
         duration: Of the undisturbed command [s].
+
+    Returns:
+        Whether the signal was sent: the command may have ended before.
 
     Raises:
         BrokenError: If the command ends with another exit code than the signal's, or leaves processes.
@@ -139,20 +179,21 @@ def strike(process: "subprocess.Popen[str]", blow: Blow, folder: Path, duration:
                 break
         time.sleep(0.005)
     allowed = {0}
-    if process.poll() is None:  # else its number may be another's by now
+    if sent := process.poll() is None:  # else its number may be another's by now
         (os.killpg if blow.to_all else os.kill)(process.pid, blow.number)
         # Whoever is struck before the command has made itself ready ends by the signal itself.
         allowed |= {-blow.number, 128 + blow.number}
     code = wait(process)
     if code not in allowed:
         raise BrokenError(f"exit code {code} after {blow}; expected one of {sorted(allowed)}")
+    return sent
 
 
-def wait(process: "subprocess.Popen[str]") -> int:
+def wait(process: Process) -> int:
     """Wait for a command and its workers.
 
     Args:
-        process: Of `start`.
+        process: Of the command.
 
     Returns:
         Exit code.
@@ -257,14 +298,14 @@ def undisturbed(name: str) -> tuple[dict[str, Any], float]:
         folder = Path(root) / "run"
         shutil.copytree(_inputs(name), folder)
         begin = time.monotonic()
-        code = wait(start(name, folder))
+        code = wait(Forked(name, folder))
         duration = time.monotonic() - begin
         if code:
             raise BrokenError(f"{name} fails undisturbed: {folder.with_name('run.log').read_text()}")
         return contents(folder), duration
 
 
-def run_round(seed: int, root: Path, name: str | None = None) -> str:
+def run_round(seed: int, root: Path, name: str | None = None) -> tuple[str, list[Blow]]:
     """Kill a command, once or several times, repeat it until it ends, and compare.
 
     Args:
@@ -273,7 +314,7 @@ def run_round(seed: int, root: Path, name: str | None = None) -> str:
         name: Of the command; chosen by the seed by default.
 
     Returns:
-        What was done.
+        Name of the command, and the signals that were sent.
 
     Raises:
         BrokenError: If the command fails, leaves processes or temporary files, or something other than an undisturbed
@@ -284,19 +325,18 @@ def run_round(seed: int, root: Path, name: str | None = None) -> str:
     expected, duration = undisturbed(name)
     folder = root / "run"
     shutil.copytree(_inputs(name), folder)
-    for blow in blows:
-        strike(start(name, folder), blow, folder, duration)
-    if code := wait(start(name, folder)):
+    sent = [blow for blow in blows if strike(Forked(name, folder), blow, folder, duration)]
+    if code := wait(Forked(name, folder)):
         raise BrokenError(f"{name} ends with {code} when it is repeated, see {folder.with_name('run.log')}")
     found = contents(folder)
     if wrong := sorted(k for k in expected.keys() | found.keys() if expected.get(k) != found.get(k)):
         raise BrokenError(f"{name} leaves otherwise than undisturbed: {', '.join(wrong)}")
-    signals = ", ".join(
-        f"{blow.number.name}{' to all' if blow.to_all else ''} at "
-        + (f"{blow.share:.0%}" if blow.change is None else f"change {blow.change}")
-        for blow in blows
-    )
-    return f"{name}: {signals}"
+    return name, sent
+
+
+def _told(blow: Blow) -> str:
+    moment = f"{blow.share:.0%}" if blow.change is None else f"change {blow.change}"
+    return f"{blow.number.name}{' to all' if blow.to_all else ''} at {moment}"
 
 
 def main() -> None:
@@ -306,19 +346,23 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the first round; the others count up from it")
     parser.add_argument("--command", choices=[*COMMANDS], help="one alone")
     arguments = parser.parse_args()
-    failed = []
+    failed, counts = [], {name: Counter[str]() for name in COMMANDS}
     for seed in range(arguments.seed, arguments.seed + arguments.rounds):
         root = Path(tempfile.mkdtemp(prefix=f"kill_{seed}_"))
         begin = time.monotonic()
         try:
-            result = run_round(seed, root, arguments.command)
+            name, sent = run_round(seed, root, arguments.command)
         except BrokenError as error:
             failed.append(seed)
             result = f"FAILED, see {root}: {error}"
         else:
             shutil.rmtree(root)
+            counts[name].update(["rounds", *(blow.number.name for blow in sent)])
+            result = f"{name}: {', '.join(map(_told, sent)) or 'ended before it was struck'}"
         sys.stdout.write(f"round {seed} ({time.monotonic() - begin:.0f} s): {result}\n")
         sys.stdout.flush()
+    for name, count in counts.items():
+        sys.stdout.write(f"{name}: {', '.join(f'{number} {what}' for what, number in count.items())}\n")
     sys.stdout.write(f"{arguments.rounds - len(failed)} of {arguments.rounds} rounds end as undisturbed")
     sys.stdout.write(f"; not so {', '.join(map(str, failed))}\n" if failed else "\n")
     sys.exit(bool(failed))

@@ -1,15 +1,19 @@
-"""Commands that `tests.kill` kills, small enough that one takes a few seconds, each as a program of its own.
+"""Commands that `tests.kill` kills, small enough that one takes a few seconds, and the program that starts them.
 
-`python kill_commands.py NAME` runs one in the current folder, which holds its inputs.
+`python kill_commands.py MODULE ...` imports modules and then runs what its standard input tells it to, each command in
+a process of its own that is forked: imports take longer than all that is worth killing.
 """
 
 import hashlib
+import importlib
 import os
+import signal
 import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -32,6 +36,8 @@ class Command:
     """What the program does, in the current folder."""
     prepare: Callable[[Path], None] = lambda folder: None
     """Puts its inputs into a folder."""
+    imports: tuple[str, ...] = ("socialnav_mj.cli", "socialnav_mj.studies.paper.outputs", "pandas", "requests")
+    """What is imported before it starts; nothing that has threads, which a fork would leave behind."""
 
 
 def _typed(*arguments: str) -> None:
@@ -41,27 +47,34 @@ def _typed(*arguments: str) -> None:
     main([*arguments])
 
 
-def _evaluate() -> None:
-    _typed(*f"evaluate --dataset {TINY} --scenarios 4 --draws 2 --jobs 2 --out out".split())
+def _evaluate(jobs: int = 1) -> None:
+    _draw_coarsely()
+    wanted = f"--dataset {TINY} --scenarios 4 --controllers go_straight --draws 2 --jobs {jobs} --out out"
+    _typed("evaluate", *wanted.split())
+
+
+def _draw_coarsely() -> None:
+    """Draw and resample little: neither is what is tested, and both take their time."""
+    from socialnav_mj.report import style
+
 
 
 def _report() -> None:
-    _typed("report", "out", "--jobs", "2")
+    _draw_coarsely()
+    _typed("report", "out", "--jobs", "1")
 
 
 def _prepare_report(folder: Path) -> None:
     from socialnav_mj.evaluation import Evaluation, evaluate
 
-    evaluation = Evaluation(dataset=str(TINY), scenarios=("scenario_4",), draws=2)
+    evaluation = Evaluation(dataset=str(TINY), scenarios=("scenario_4",), controllers=("go_straight",), draws=2)
     list(evaluate(evaluation, folder / "out", command="as typed", n_jobs=1))
 
 
 def _reproduce() -> None:
-    from socialnav_mj.report import style
-
-    style.DOTS_PER_INCH = 40  # not what is tested, and takes its time
+    _draw_coarsely()
     policies = [f"policies/p{seed}.safetensors" for seed in (0, 1)]
-    _typed(*f"reproduce --dataset {TINY} --scenarios 1 4 --draws 1 --jobs 2 --out out --policies".split(), *policies)
+    _typed(*f"reproduce --dataset {TINY} --scenarios 1 4 --draws 1 --jobs 1 --out out --policies".split(), *policies)
 
 
 def _prepare_reproduce(folder: Path) -> None:
@@ -71,6 +84,7 @@ def _prepare_reproduce(folder: Path) -> None:
 
 
 def _train() -> None:
+    from socialnav_mj.config import Scenario
     from socialnav_mj.learning import config as module
 
     small = {
@@ -82,9 +96,9 @@ def _train() -> None:
         "hidden": (16,),
         "batch_size": 32,
         "updates_per_scene_step": 1,
-        "guided_scene_steps": 40,
-        "buffer_size": 400,
-        "checkpoint_every": 60,
+        "guided_scene_steps": 20,
+        "buffer_size": 200,
+        "checkpoint_every": 40,
         "validation_shares": (0.7,),
     }
     whole = module.TrainingConfig
@@ -92,7 +106,8 @@ def _train() -> None:
     def made(**given: Any) -> Any:
         return whole(**{**given, **small})
 
-    made.scene_steps = 200  # type: ignore[attr-defined]
+    made.scene_steps = 120  # type: ignore[attr-defined]
+    Scenario.allowed_steps = lambda self, distance: 30  # type: ignore[method-assign]  # short validations
     module.TrainingConfig = made
     _typed("train", "replay-irl", "--dataset", str(TINY), "--out", "out")
 
@@ -108,8 +123,9 @@ def _fetch() -> None:
 
 COMMANDS = {
     "evaluate": Command(run=_evaluate),
+    "evaluate in two processes": Command(run=partial(_evaluate, 2)),
     "report": Command(run=_report, prepare=_prepare_report),
-    "train": Command(run=_train),
+    "train": Command(run=_train, imports=("socialnav_mj.cli", "socialnav_mj.learning.training", "torch._dynamo")),
     "reproduce": Command(run=_reproduce, prepare=_prepare_reproduce),
     "fetch": Command(run=_fetch),
 }
@@ -144,5 +160,41 @@ def serve() -> str:
     return f"http://127.0.0.1:{server.server_port}/"
 
 
+def run_what_is_told() -> None:
+    """For each line NAME, tab, FOLDER: run a command in a folder, in a forked process that leads a group of its own.
+
+    The process writes its number when it can be killed, and this one the exit code when it has ended. What the command
+    says is in `FOLDER.log`.
+    """
+    while line := sys.stdin.readline():
+        name, folder = line.rstrip("\n").split("\t")
+        child = os.fork()
+        if not child:
+            _lead(Path(folder))
+            COMMANDS[name].run()
+            return
+        _, status = os.waitpid(child, 0)
+        _tell(os.waitstatus_to_exitcode(status))
+
+
+def _lead(folder: Path) -> None:
+    """Become the leader of a process group in a folder, and hear all signals, even if this runs in the background."""
+    os.setsid()
+    os.chdir(folder)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    _tell(os.getpid())
+    log = os.open(folder.with_name(f"{folder.name}.log"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    for stream, target in ((os.open(os.devnull, os.O_RDONLY), 0), (log, 1), (log, 2)):
+        os.dup2(stream, target)
+
+
+def _tell(number: int) -> None:
+    os.write(1, f"{number}\n".encode())
+
+
 if __name__ == "__main__":
-    COMMANDS[sys.argv[1]].run()
+    for module in sys.argv[1:]:
+        importlib.import_module(module)
+    run_what_is_told()

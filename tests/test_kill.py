@@ -6,15 +6,15 @@ import sys
 
 import kill
 import pytest
-from kill import COMMANDS, SIGNALS, Blow, BrokenError, blows_of, contents, run_round, start, strike, undisturbed, wait
+from kill import COMMANDS, SIGNALS, Blow, BrokenError, Forked, blows_of, contents, run_round, strike, undisturbed, wait
 
 ALL = [*COMMANDS]
 
 
 @pytest.mark.parametrize(("name", "seed"), [("evaluate", 2), ("fetch", 5)])
 def test_killed_command_leaves_in_the_end_what_an_undisturbed_one_does(name, seed, tmp_path):
-    assert signal.SIGKILL in {blow.number for blow in blows_of(seed)[1]}
-    run_round(seed, tmp_path, name)
+    chosen, sent = run_round(seed, tmp_path, name)
+    assert chosen == name and signal.SIGKILL in {blow.number for blow in sent}
 
 
 @pytest.mark.slow
@@ -67,6 +67,6 @@ def test_two_commands_in_one_folder_leave_what_one_does(tmp_path):
     expected, _ = undisturbed("evaluate")
     folder = tmp_path / "run"
     folder.mkdir()
-    both = [start("evaluate", folder) for _ in range(2)]
+    both = [Forked("evaluate", folder) for _ in range(2)]
     assert [wait(process) for process in both] == [0, 0], folder.with_name("run.log").read_text()
     assert contents(folder) == expected
