@@ -157,6 +157,7 @@ class Replay:
             cast: Of this recording and scenario; says who is replayed, in which slot, from when to when.
         """
         self._count = count = scenario.n_sub_steps
+        self._timestep, self._yield = scenario.physics_timestep, scenario.pedestrian == "compliant"
         slots = cast.n_pedestrian_slots
         self._steps = steps = int(cast.pedestrian_last_step.max(initial=-1)) + 1
         # One row more than there are control steps: an empty scene, for all the time after.
@@ -197,15 +198,25 @@ class Replay:
             changed=self._changed[row] if step == row else self._changed[row][:0],
         )
 
-    def motion(self, step: int) -> tuple[Array, Array]:
+    def motion(self, step: int) -> tuple[Array, Array, Array | None]:
         """Positions and velocities at the beginning of every physics step of a control step.
 
         Args:
             step: Control step >= 0.
 
         Returns:
-            Position [m] and velocity [m/s], both of shape (n_sub_steps, n_slots, 2).
+            Position [m] and velocity [m/s], both of shape (n_sub_steps, n_slots, 2); and for people who yield the mean
+            velocity in the physics step before and in each, shape (n_sub_steps + 1, n_slots, 2), else None [m/s].
         """
         step = min(step, self._steps)
         rows = slice(step * self._count, (step + 1) * self._count)
-        return self._position[rows], self._velocity[rows]
+        return self._position[rows], self._velocity[rows], self._walk(step) if self._yield else None
+
+    def _walk(self, step: int) -> Array:
+        """Mean velocity from place to place; the recorded one where a person has just come, or is about to leave."""
+        first, end = step * self._count, (step + 1) * self._count
+        rows = np.arange(first - 1, end + 1)
+        there = rows.clip(0, len(self._position) - 1)
+        same = (self._pedestrian[there // self._count] == self._pedestrian[step]) & (there == rows)[:, None]
+        walk = np.diff(np.where(same[..., None], self._position[there], np.nan), axis=0) / self._timestep
+        return np.where(np.isnan(walk), self._velocity[rows[:-1].clip(first, end - 1)], walk)

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 TurnLimit = Literal["per_step", "per_second"]
 OnCollision = Literal["continue", "retire"]
+Pedestrian = Literal["rigid", "compliant"]
 
 ROBOT_RADII = (0.1, 0.4)
 """Least and largest radius of a robot's bumper. A sphere whose centre is 0.10 m high has to reach down to the floor;
@@ -75,6 +76,8 @@ class Scenario:
     """Body of every agent."""
     pedestrian_radius: float = 0.15
     """Radius of a replayed person's body [m]."""
+    pedestrian: Pedestrian = "rigid"
+    """A replayed person's body: where the recording has it, whatever it meets; or of 75 kg, with a limited force."""
     turn_limit: TurnLimit = "per_step"
     """Reading of the paper's [-pi/6, pi/6]: a turn per control step, or a yaw rate in rad/s."""
     on_collision: OnCollision = "continue"
@@ -105,13 +108,12 @@ class Scenario:
             "integers >= 0",
         )
         object.__setattr__(self, "seed", int(self.seed))  # numpy's integers are no JSON values
-        _require(self.turn_limit in get_args(TurnLimit), "turn_limit", self.turn_limit, ", ".join(get_args(TurnLimit)))
-        _require(
-            self.on_collision in get_args(OnCollision),
-            "on_collision",
-            self.on_collision,
-            ", ".join(get_args(OnCollision)),
-        )
+        for name, choices in (
+            ("pedestrian", get_args(Pedestrian)),
+            ("turn_limit", get_args(TurnLimit)),
+            ("on_collision", get_args(OnCollision)),
+        ):
+            _require(getattr(self, name) in choices, name, getattr(self, name), ", ".join(choices))
         for name in ("control_timestep", "goal_radius"):
             _require_number(getattr(self, name), name, "numbers > 0", lambda value: value > 0.0)
         _require_within(self.pedestrian_radius, "pedestrian_radius", *PEDESTRIAN_RADII)

@@ -43,6 +43,7 @@ class Contact:
     push_force: float
     peak_time: float
     squeeze: float
+    held_back: float
 
     def seen_by_partner(self, heading: float) -> "Contact":
         """The same touch from the other agent's side.
@@ -74,6 +75,7 @@ FORCE_COLUMNS = (
     "push_force",
     "peak_time",
     "squeeze",
+    "held_back",
 )
 """Fields of `Contact` that only a simulation knows: NaN in the human row."""
 PLANAR_COLUMNS = ("position", "normal", "agent_velocity", "partner_velocity")

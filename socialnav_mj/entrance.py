@@ -51,18 +51,20 @@ class Ghosts:
     def __init__(self) -> None:
         """Nobody is a ghost."""
         self._slots: set[int] = set()
+        self.overlaps: set[tuple[int, int]] = set()
+        """(agent, pedestrian) of every ghost that has passed through an agent so far."""
 
-    def solidify(self, now: SlotCrowd, robots: Array, *, distance: float) -> tuple[IntArray, IntArray]:
+    def solidify(self, now: SlotCrowd, agents: IntArray, robots: Array, *, distance: float) -> IntArray:
         """Take in who has just appeared, and let go whom no robot overlaps.
 
         Args:
             now: The people at the current control step.
-            robots: Positions of the robots in the scene, shape (k, 2) [m].
+            agents: Indices of the agents in the scene, shape (k,).
+            robots: Positions of their robots, shape (k, 2) [m].
             distance: Centre distance at which a robot and a person touch [m].
 
         Returns:
-            Slots of those who may touch robots from now on, ascending; and who passes through whom, (slot, row of
-            `robots`) of every overlap, shape (j, 2).
+            Slots of those who may touch robots from now on, ascending.
         """
         changed = set(now.changed.tolist())
         self._slots = (self._slots - changed) | (changed & set(now.present.tolist()))
@@ -71,7 +73,8 @@ class Ghosts:
         clear = ~overlap.any(axis=1)
         self._slots = set(pending[~clear].tolist())
         ghost, robot = np.nonzero(overlap)
-        return pending[clear], np.stack([pending[ghost], robot], axis=1)
+        self.overlaps |= {*zip(agents[robot].tolist(), now.pedestrian[pending[ghost]].tolist(), strict=True)}
+        return pending[clear]
 
 
 def is_free(place: Array, *, people: Array, robots: Array, scenario: Scenario) -> bool:

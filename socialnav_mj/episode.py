@@ -101,7 +101,7 @@ class Episode:
     contact_agent_velocity: Array
     """(k, 2) just before the touch [m/s]."""
     contact_partner_velocity: Array
-    """(k, 2) just before the touch; a pedestrian's is the recorded one [m/s]."""
+    """(k, 2) just before the touch; a rigid pedestrian's is the recorded one [m/s]."""
     contact_impact_impulse: Array
     """(k,) integral of the normal force over the first 0.1 s after the first touch. It and the columns below are
     NaN where there is no physics (human row) [N s]."""
@@ -118,6 +118,8 @@ class Episode:
     contact_squeeze: Array
     """(k,) largest force by which either robot of the touch was squeezed while it lasted: half of what the normal
     forces on it have in sum more than their resultant, which moves it [N]."""
+    contact_held_back: Array
+    """(k,) by how much a pedestrian's distance from its recorded place grew while it touched; 0 for rigid ones [m]."""
 
     policies: tuple[str, ...]
     """Names that `agent_policy` indexes; the controller's name alone if it never switches."""

@@ -10,21 +10,20 @@ from numpy.typing import NDArray
 from socialnav_mj.elementary import arccos
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
-from socialnav_mj.scene import REARM_TIME, agent_name
+from socialnav_mj.people import PARKING_DEPTH, people_of
+from socialnav_mj.scene import REARM_TIME, agent_name, pedestrian_name
 from socialnav_mj.scene_index import index_scene
 from socialnav_mj.touch import Touch, TouchLog
 
 _SLEEP_NEVER = int(mujoco.mjtSleepPolicy.mjSLEEP_NEVER)
 _SLEEP_ALLOWED = int(mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED)
-_PARKING_DEPTH = 20.0
-"""How far below the floor bodies wait that are not in the scene [m]."""
 
 
 class Physics(MujocoPhysics):
-    """A crowd of robots and mocap pedestrians.
+    """A crowd of robots and replayed people.
 
-    Every body is in a slot, and a slot is either in use or parked below the floor, out of contact. Mocap poses are
-    written and contacts read at every physics step. All getters return arrays that the caller owns, one row a slot.
+    Every body is in a slot, and a slot is either in use or parked below the floor, out of contact. People are moved
+    and contacts read at every physics step. All getters return arrays that the caller owns, one row a slot.
     A copy has the same state, but has seen no touches yet.
     """
 
@@ -47,10 +46,9 @@ class Physics(MujocoPhysics):
         model = data.model.ptr
         self._index = index_scene(model)
         self._bits = np.array(model.geom_user[:, :2], dtype=np.int32)
-        self._mocap_pos, self._mocap_quat = data.ptr.mocap_pos, data.ptr.mocap_quat
+        self._people = people_of(self._index, model, data.ptr)
         self._velocity_before = np.zeros(model.nv)
-        self._path: Array | None = None
-        self._path_velocity: Array | None = None
+        self._path: tuple[Array | None, Array | None, Array | None] = (None, None, None)
         self._touches = TouchLog(self._index, rearm_time=float(model.numeric(REARM_TIME).data[0]))
         super()._reload_from_data(data)
 
@@ -61,7 +59,7 @@ class Physics(MujocoPhysics):
 
     @property
     def n_pedestrians(self) -> int:
-        """Mocap bodies in the pool."""
+        """People in the pool."""
         return self._index.n_pedestrians
 
     def reset(self, keyframe_id: int | None = None) -> None:
@@ -72,7 +70,7 @@ class Physics(MujocoPhysics):
         """
         super().reset(keyframe_id)
         self._touches.forget()
-        self._path = self._path_velocity = None
+        self._path = (None, None, None)
         for slot in range(self.n_agents):
             self.park_agent(slot)
         self.park_pedestrians(np.arange(self.n_pedestrians))
@@ -147,7 +145,7 @@ class Physics(MujocoPhysics):
         Args:
             slot: Agent slot.
         """
-        self._set_agent_state(slot, (2.0 * slot, 0.0, -_PARKING_DEPTH), 0.0, present=False)
+        self._set_agent_state(slot, (2.0 * slot, 0.0, -PARKING_DEPTH), 0.0, present=False)
         self._touches.end_of_agent(slot)
 
     def _set_agent_state(self, slot: int, position: tuple[float, ...], heading: float, *, present: bool) -> None:
@@ -167,17 +165,35 @@ class Physics(MujocoPhysics):
 
     # Pedestrians
 
-    def set_pedestrian_pose(self, slots: IntArray, position: Array, quaternion: Array) -> None:
-        """Move people at once.
+    def pedestrian_position(self) -> Array:
+        """Where people are: where the recording has them, or where their bodies were held if they yield.
+
+        Returns:
+            Shape (n_pedestrians, 2) [m].
+        """
+        return self._people.position()
+
+    def pedestrian_velocity(self) -> Array | None:
+        """Velocity of the bodies of people who yield.
+
+        Returns:
+            Shape (n_pedestrians, 2) [m/s]; None for rigid people, whose mocap bodies have none.
+        """
+        address = self._index.pedestrian_qvel
+        return self.data.qvel[address] if len(address) else None
+
+    def set_pedestrian_pose(
+        self, slots: IntArray, position: Array, quaternion: Array, velocity: Array | None = None
+    ) -> None:
+        """Tell people where the recording has them: rigid ones, and who was parked, are there at once; others turn.
 
         Args:
             slots: Pedestrian slots, shape (k,).
             position: Shape (k, 2) [m].
             quaternion: (w, x, y, z), shape (k, 4).
+            velocity: Recorded one, shape (k, 2); None for standing people [m/s].
         """
-        self._mocap_pos[slots, :2] = position
-        self._mocap_pos[slots, 2] = 0.0
-        self._mocap_quat[slots] = quaternion
+        self._people.place(slots, position, np.zeros_like(position) if velocity is None else velocity, quaternion)
 
     def park_pedestrians(self, slots: IntArray) -> None:
         """Take people out of the scene.
@@ -185,20 +201,19 @@ class Physics(MujocoPhysics):
         Args:
             slots: Pedestrian slots, shape (k,).
         """
-        self._mocap_pos[slots, 0] = 2.0 * slots
-        self._mocap_pos[slots, 1] = 2.0
-        self._mocap_pos[slots, 2] = -_PARKING_DEPTH
+        self._people.park(slots)
         self.set_pedestrian_contacts(slots, np.zeros(len(slots), dtype=bool))
 
-    def set_pedestrian_path(self, position: Array, velocity: Array) -> None:
-        """Say how people move during the next call of `step`.
+    def set_pedestrian_path(self, position: Array, velocity: Array, walk: Array | None = None) -> None:
+        """Say how people move during the next call of `step`; see `People.follow`.
 
         Args:
             position: At the beginning of each physics step, shape (n_sub_steps, n_pedestrians, 2), NaN for those who
                 are not in the scene [m].
             velocity: Recorded velocity at the same times and of the same shape [m/s].
+            walk: Mean velocity in the physics step before and in each, shape (n_sub_steps + 1, n_pedestrians, 2) [m/s].
         """
-        self._path, self._path_velocity = position, velocity
+        self._path = position, velocity, walk
 
     def set_pedestrian_contacts(self, slots: IntArray, enabled: NDArray[np.bool_]) -> None:
         """Let people touch robots, or pass through them.
@@ -230,52 +245,49 @@ class Physics(MujocoPhysics):
         """
         model, data = self.model.ptr, self.data.ptr
         qvel, before, contact = data.qvel, self._velocity_before, data.contact
-        people = self._mocap_pos[:, :2]
-        path = self._filled_path(people, nstep)
+        people, (path, velocity, walk) = self._people, self._path
+        if path is not None and len(path) != nstep:
+            raise ValueError(f"the pedestrians' path has {len(path)} positions for {nstep} physics steps")
+        people.follow(path, velocity, walk, nstep)
         time, kinds_of_warning = data.time, np.count_nonzero(self._warnings)
         try:
             with self.check_invalid_state():
                 for k in range(nstep):
-                    if path is not None:
-                        np.copyto(people, path[k])
+                    people.advance(k)
                     np.copyto(before, qvel)
                     time = data.time
                     mujoco.mj_step(model, data)
                     # The floor is geom 0, and MuJoCo names it first: all else is a touch of two bodies.
                     if np.count_nonzero(contact.geom1):
-                        walking = None if self._path_velocity is None else self._path_velocity[k]
-                        self._touches.note(model, data, time=time, velocity_before=before, walking=walking)
+                        self._touches.note(model, data, time=time, velocity_before=before, people=people, step=k)
                     # One step later an invalid number has spread to all robots and nobody can tell whose it was.
                     if np.count_nonzero(self._warnings) != kinds_of_warning:
                         break
         except PhysicsError as error:
             raise PhysicsError(f"at {time:.2f} s: {error}{self._culprit()}") from error
-        self._path = self._path_velocity = None
+        self._path = (None, None, None)
 
     def refresh_poses(self) -> None:
         """Bring the poses of bodies, geoms and cameras up to date, which `step` leaves one physics step behind."""
         mujoco.mj_kinematics(self.model.ptr, self.data.ptr)
         mujoco.mj_camlight(self.model.ptr, self.data.ptr)
 
-    def _filled_path(self, people: Array, nstep: int) -> Array | None:
-        """Positions of all mocap bodies at every physics step; those who are not in the scene stay where they are."""
-        if self._path is None:
-            return None
-        if len(self._path) != nstep:
-            raise ValueError(f"the pedestrians' path has {len(self._path)} positions for {nstep} physics steps")
-        return np.where(np.isnan(self._path), people, self._path)
-
     def _culprit(self) -> str:
-        """Name the robot whose state MuJoCo found invalid first, if that is what it warns of."""
-        warning = mujoco.mjtWarning
-        for kind, address in (
-            (warning.mjWARN_BADQPOS, self._index.qpos),
-            (warning.mjWARN_BADQVEL, self._index.qvel),
-            (warning.mjWARN_BADQACC, self._index.qvel),
+        """Name whose state MuJoCo found invalid first, if that is what it warns of."""
+        warning, index = mujoco.mjtWarning, self._index
+        for kind, robots, people in (
+            (warning.mjWARN_BADQPOS, index.qpos, index.pedestrian_qpos),
+            (warning.mjWARN_BADQVEL, index.qvel, index.pedestrian_qvel),
+            (warning.mjWARN_BADQACC, index.qvel, index.pedestrian_qvel),
         ):
             if self._new_warnings[int(kind)]:
-                slot = int(np.searchsorted(address, self.data.warning.lastinfo[int(kind)], side="right")) - 1
-                return f"; first invalid in {agent_name(slot).rstrip('/')}"
+                first = self.data.warning.lastinfo[int(kind)]
+                agent, person = (
+                    np.searchsorted(robots, first, side="right") - 1,
+                    np.flatnonzero((people == first).any(1)),
+                )
+                name = pedestrian_name(int(person[0])) if person.size else agent_name(int(agent))
+                return f"; first invalid in {name.rstrip('/')}"
         return ""
 
     # Contacts

@@ -25,6 +25,7 @@ class Recorder:
         self._task = task
         self._samples: list[tuple[IntArray, Array, Array, Array, Array, Array]] = []
         self._actions: list[tuple[IntArray, Array, IntArray]] = []
+        self._people: list[tuple[IntArray, Array, Array]] = []
 
     def note_sample(self) -> None:
         """Keep the state of every agent under way, at the reset and after every control step."""
@@ -40,6 +41,11 @@ class Recorder:
                 sample.tilt[slots],
             )
         )
+
+        if self._task.scenario.pedestrian == "compliant":
+            people = self._task.people
+            there = people.present
+            self._people.append((people.pedestrian[there], people.position[there], people.velocity[there]))
 
     def note_action(self, agent: IntArray, action: Array, policy: IntArray) -> None:
         """Keep what was commanded between two samples.
@@ -86,7 +92,7 @@ class Recorder:
             agent_deadline=spawn_time + cast.agent_allowed_steps * dt,
             agent_end_time=np.where(spawned, end_step * dt, np.nan),
             agent_outcome=np.where(task.outcome >= 0, task.outcome, unfinished).astype(np.int64),
-            agent_ghost_overlaps=np.bincount([agent for agent, _ in sorted(task.ghost_overlaps)], minlength=n).astype(
+            agent_ghost_overlaps=np.bincount([agent for agent, _ in sorted(task.ghosts.overlaps)], minlength=n).astype(
                 np.int64
             ),
             agent_position=position,
@@ -96,11 +102,19 @@ class Recorder:
             agent_tilt=tilt,
             agent_wheel_speed=wheel_speed,
             agent_policy=policy,
-            **_pedestrian_series(task.recording, cast, time, dt),
+            **self._pedestrians(time),
             **self._contacts(),
             policies=policies,
             metadata=metadata,
         )
+
+    def _pedestrians(self, time: Array) -> dict[str, NDArray[Any]]:
+        """Motion of the people: the recording's, or what was noted of those who yield."""
+        series = _pedestrian_series(self._task.recording, self._task.cast, time, self._task.scenario.control_timestep)
+        for k, (pedestrian, position, velocity) in enumerate(self._people):
+            series["pedestrian_position"][k, pedestrian] = position
+            series["pedestrian_velocity"][k, pedestrian] = velocity
+        return series
 
     def _contacts(self) -> dict[str, NDArray[Any]]:
         """Columns of the contact log; a touch between two agents gives a row to each."""
@@ -126,6 +140,7 @@ class Recorder:
                 push_force=touch.push_force,
                 peak_time=touch.peak_time,
                 squeeze=touch.squeeze,
+                held_back=touch.held_back,
             )
             contacts.append(contact)
             if touch.kind == Partner.AGENT:

@@ -1,10 +1,10 @@
-"""Truth about every agent slot at one control step."""
+"""Truth about every slot at one control step."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from socialnav_mj.cast import NOBODY
+from socialnav_mj.cast import NOBODY, SlotCrowd
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array
 from socialnav_mj.physics import Physics
@@ -84,3 +84,21 @@ class Sample:
         for name, value in values.items():
             value[slots] = getattr(other, name)[slots]
         return Sample(**values)
+
+
+def people_of(physics: Physics, recorded: SlotCrowd) -> SlotCrowd:
+    """The people where their bodies are; for rigid ones that is where the recording has them.
+
+    Args:
+        physics: After the people were told where the recording has them.
+        recorded: The people at the current control step.
+
+    Returns:
+        `recorded`, with position and velocity of the bodies if they yield.
+    """
+    velocity = physics.pedestrian_velocity()
+    if velocity is None:
+        return recorded
+    absent = np.isnan(recorded.position)
+    position = np.where(absent, np.nan, physics.pedestrian_position())
+    return replace(recorded, position=position, velocity=np.where(absent, np.nan, velocity))

@@ -1,4 +1,4 @@
-"""Assembly of the MJCF scene: the arena, a pool of robots, a pool of mocap pedestrians."""
+"""Assembly of the MJCF scene: the arena, a pool of robots, a pool of pedestrians."""
 
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,8 @@ AGENT_PREFIX = "agent_"
 PEDESTRIAN_PREFIX = "pedestrian_"
 REARM_TIME = "contact_rearm_time"
 """Name of the model's number that says how long two bodies must be apart before a touch counts as new [s]."""
+PERSON_MASS = 75.0
+"""Of a person who yields: the effective mass behind a lower leg, ISO/TS 15066 table A.3, an adult's [kg]."""
 _TOLERANCE = 1e-6
 
 
@@ -44,12 +46,13 @@ def pedestrian_name(slot: int) -> str:
 def build_model(
     scenario: Scenario, *, n_agent_slots: int, n_pedestrian_slots: int, low: Array, high: Array
 ) -> mujoco.MjModel:
-    """Compile the arena with a pool of robots and a pool of mocap pedestrians, apart from one another on the floor.
+    """Compile the arena with a pool of robots and a pool of pedestrians, apart from one another on the floor.
 
     Args:
-        scenario: Gives the robot and its limits, radii, the physics time step and the re-arm time of contacts.
+        scenario: Gives the robot and its limits, kind and radius of people, the physics time step and the re-arm time
+            of contacts.
         n_agent_slots: Robots in the pool, >= 1.
-        n_pedestrian_slots: Mocap bodies in the pool, >= 1.
+        n_pedestrian_slots: People in the pool, >= 1.
         low: Least coordinates of the recorded crowd, shape (2,) [m].
         high: Greatest coordinates, shape (2,) [m].
 
@@ -79,7 +82,11 @@ def build_model(
     for slot in range(n_pedestrian_slots):
         person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
         person.geom("body").size[0] = scenario.pedestrian_radius
-        arena.attach(person, prefix=pedestrian_name(slot), frame=_apart(arena, slot, row=1))
+        frame = _apart(arena, slot, row=1)
+        if scenario.pedestrian == "compliant":
+            person.body("pedestrian").mocap = False
+            frame = _carrier(arena, slot).add_frame()
+        arena.attach(person, prefix=pedestrian_name(slot), frame=frame)
     # What a slot needs that is in use, and when touches count: a copy of the physics has only the model to read.
     arena.nuser_geom = 2
     for geom in arena.geoms:
@@ -93,6 +100,18 @@ def build_model(
 def _apart(arena: mujoco.MjSpec, slot: int, *, row: int) -> Any:
     """Frame on the floor away from all others: in one heap a pool of 86 robots has 4600 contacts to be solved."""
     return arena.worldbody.add_frame(pos=[2.0 * slot, 2.0 * row, 0.0])
+
+
+def _carrier(arena: mujoco.MjSpec, slot: int) -> Any:
+    """A body that slides along x and y and bears a person's mass; the person in it is turned by its quaternion."""
+    name = pedestrian_name(slot)
+    # The inertia is never felt: the body does not turn.
+    mass = {"explicitinertial": True, "mass": PERSON_MASS, "ipos": [0.0, 0.0, 0.9], "inertia": [10.0, 10.0, 1.0]}
+    carrier = arena.worldbody.add_body(name=f"{name}carrier", pos=[2.0 * slot, 2.0, 0.0], **mass)
+    for axis, way in (("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0])):
+        carrier.add_joint(name=name + axis, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way)
+    carrier.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
+    return carrier
 
 
 def _robot_file(robot: Robot, assets: Path) -> Path:

@@ -31,6 +31,14 @@ class SceneIndex:
     """(n,) kinematic tree of each robot."""
     pedestrian_geom: IntArray
     """(m,) collider of each pedestrian; mocap bodies have the slots' order."""
+    pedestrian_body: IntArray
+    """(m,) body of each, which has the heading."""
+    pedestrian_carrier: IntArray
+    """(m,) body that bears its mass; (0,) for mocap bodies, as the two below."""
+    pedestrian_qpos: IntArray
+    """(m, 2) addresses of x and y in `qpos`, from the carrier's place in the model."""
+    pedestrian_qvel: IntArray
+    """(m, 2) the same in `qvel`."""
     owner: IntArray
     """(ngeom,) whose collider a geom is: 0 to n - 1 for bumpers, n to n + m - 1 for people, -1 for all others."""
 
@@ -41,7 +49,7 @@ class SceneIndex:
 
     @property
     def n_pedestrians(self) -> int:
-        """m, the mocap bodies in the pool."""
+        """m, the people in the pool."""
         return len(self.pedestrian_geom)
 
 
@@ -55,13 +63,16 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
         Good for this model and every copy of it.
 
     Raises:
-        ValueError: If the floor is not the first geom or the pedestrians are not the mocap bodies, in this order.
+        ValueError: If the floor is not the first geom or there are mocap bodies and they are not the pedestrians, in
+            this order.
     """
     names = [model.body(i).name for i in range(model.nbody)]
     agents = [agent_name(i) for i in range(_count(names, AGENT_PREFIX, "/robot"))]
     people = [pedestrian_name(i) for i in range(_count(names, PEDESTRIAN_PREFIX, "/pedestrian"))]
-    mocap = model.body_mocapid[np.array([model.body(name + "pedestrian").id for name in people])]
-    if not np.array_equal(mocap, np.arange(model.nmocap)) or model.geom("floor").id != 0:
+    body = np.array([model.body(name + "pedestrian").id for name in people], dtype=np.int64)
+    yielding = [] if model.nmocap else people
+    mocap = model.body_mocapid[body]
+    if (model.nmocap and not np.array_equal(mocap, np.arange(model.nmocap))) or model.geom("floor").id != 0:
         raise ValueError("the scene must have the floor as its first geom and the pedestrians as its mocap bodies")
     root = np.asarray(model.body_rootid)
     robots = [model.body(name + "robot").id for name in agents]
@@ -84,8 +95,16 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
         agent_dofs=belonging(model.dof_bodyid),
         agent_joints=belonging(model.jnt_bodyid),
         pedestrian_geom=bodies,
+        pedestrian_body=body,
+        pedestrian_carrier=np.array([model.body(name + "carrier").id for name in yielding], dtype=np.int64),
+        pedestrian_qpos=_addresses([[model.joint(name + axis).qposadr[0] for axis in "xy"] for name in yielding]),
+        pedestrian_qvel=_addresses([[model.joint(name + axis).dofadr[0] for axis in "xy"] for name in yielding]),
         owner=owner,
     )
+
+
+def _addresses(pairs: list[list[int]]) -> IntArray:
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def _count(names: list[str], prefix: str, suffix: str) -> int:

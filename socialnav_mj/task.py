@@ -17,7 +17,7 @@ from socialnav_mj.observation import observe
 from socialnav_mj.outcome import OVERTURNED_TILT
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording
-from socialnav_mj.sample import Sample
+from socialnav_mj.sample import Sample, people_of
 
 PROGRESS_REWARD = 1.0
 """Reward per metre that an agent came nearer to its goal [1/m]."""
@@ -60,13 +60,13 @@ class CrowdTask(base.Task):
         self.spawn_step = np.full(n, -1, dtype=np.int64)
         self.end_step = np.full(n, -1, dtype=np.int64)
         self.collisions: list[Collision] = []
-        self.ghost_overlaps: set[tuple[int, int]] = set()
         self._slot_agent = np.full(slots, NOBODY, dtype=np.int64)
         self._queue = AgentQueue(self.cast)
-        self._ghosts = Ghosts()
+        self.ghosts = Ghosts()
         self._goal_distance = np.zeros(slots)
         self._reward = np.zeros(slots)
         self._sample = Sample.nobody(slots)
+        self.people = self._replay.crowd(0)
 
     @property
     def time(self) -> float:
@@ -186,7 +186,7 @@ class CrowdTask(base.Task):
         return self._observe(self._sample.agent)
 
     def _observe(self, agent: IntArray) -> dict[str, NDArray[Any]]:
-        sample, people = self._sample, self._replay.crowd(self.step)
+        sample, people = self._sample, self.people
         return dict(
             observe(
                 active=agent != NOBODY,
@@ -229,13 +229,13 @@ class CrowdTask(base.Task):
     def _update_pedestrians(self, physics: Physics) -> None:
         """Place people at the current step; whoever appears on a robot stays contact-free until clear of all robots."""
         now = self._replay.crowd(self.step)
-        if now.changed.size:
-            physics.park_pedestrians(now.changed)
-        physics.set_pedestrian_pose(now.present, now.position[now.present], now.quaternion[now.present])
-        solid, overlaps = self._ghosts.solidify(now, self._robots(physics), distance=self.scenario.contact_distance)
+        physics.park_pedestrians(now.changed)
+        there = now.present
+        physics.set_pedestrian_pose(there, now.position[there], now.quaternion[there], now.velocity[there])
+        self.people = people_of(physics, now)
+        agent, distance = self._slot_agent[self._slot_agent != NOBODY], self.scenario.contact_distance
+        solid = self.ghosts.solidify(self.people, agent, self._robots(physics), distance=distance)
         physics.set_pedestrian_contacts(solid, np.ones(len(solid), dtype=bool))
-        agent = self._slot_agent[self._slot_agent != NOBODY]
-        self.ghost_overlaps |= {(int(agent[robot]), int(now.pedestrian[slot])) for slot, robot in overlaps}
 
     def _robots(self, physics: Physics) -> Array:
         """Positions of the robots under way, shape (k, 2) [m]."""
@@ -247,8 +247,7 @@ class CrowdTask(base.Task):
         """Let agents in whose person has appeared, in that order, where there is room; the others wait."""
         # Slots that hold an agent in the sample are not free yet, even if its run has just ended.
         free = np.flatnonzero((self._slot_agent == NOBODY) & (self._sample.agent == NOBODY))
-        people = self._replay.crowd(self.step)
-        standing = people.position[people.present]
+        standing = self.people.position[self.people.present]
         n_free = len(free)
         for agent in self._queue.waiting(self.step):
             start = self.cast.agent_start[agent]
@@ -283,10 +282,9 @@ class CrowdTask(base.Task):
         self._goal_distance[slots] = distance
         arrived = distance <= self.scenario.goal_radius
         late = self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]
-        overturned = self._sample.tilt[slots] > OVERTURNED_TILT
         # What comes first here ends the run if several do in one step; it stays under way if none does.
         ways = {
-            Outcome.OVERTURNED: overturned,
+            Outcome.OVERTURNED: self._sample.tilt[slots] > OVERTURNED_TILT,
             Outcome.COLLIDED: np.isin(slots, struck if self.scenario.on_collision == "retire" else []),
             Outcome.ARRIVED: arrived,
             Outcome.TIMED_OUT: late,

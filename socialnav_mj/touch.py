@@ -7,6 +7,7 @@ import numpy as np
 
 from socialnav_mj.contact import IMPACT_DURATION, Partner
 from socialnav_mj.geometry import Array, yaw_of_quaternion
+from socialnav_mj.people import People
 from socialnav_mj.scene_index import SceneIndex
 
 
@@ -35,7 +36,7 @@ class Touch:
     agent_velocity: Array
     """(2,) just before [m/s]."""
     partner_velocity: Array
-    """(2,) just before; a pedestrian's is the recorded one, not the mocap body's, which the solver takes as 0 [m/s]."""
+    """(2,) just before; a rigid pedestrian's is the recorded one, which the solver does not know [m/s]."""
     impact_impulse: float = 0.0
     """Integral of the normal force over the physics steps that began within `IMPACT_DURATION` [N s]."""
     impact_force: float = 0.0
@@ -50,6 +51,10 @@ class Touch:
     """When the largest force of all so far acted, after the first touch [s]."""
     squeeze: float = 0.0
     """Largest force so far by which either robot of the touch was squeezed, see `squeeze_force` [N]."""
+    behind: float = 0.0
+    """How far the pedestrian was from its recorded place at the first touch [m]."""
+    held_back: float = 0.0
+    """How much farther it was at most since then [m]."""
 
     def feel(self, force: float, *, time: float, timestep: float) -> None:
         """Take in the force of one physics step.
@@ -137,7 +142,8 @@ class TouchLog:
         *,
         time: float,
         velocity_before: Array,
-        walking: Array | None,
+        people: People,
+        step: int,
     ) -> None:
         """Read the contacts of the physics step that was just made.
 
@@ -146,7 +152,8 @@ class TouchLog:
             data: After the step.
             time: At the beginning of the step, which is where MuJoCo finds contacts [s].
             velocity_before: `qvel` at that time.
-            walking: Recorded velocity of the people, shape (n_pedestrians, 2); None for standing ones [m/s].
+            people: As they were moved in that step.
+            step: Which of theirs it was.
         """
         pairs = self._index.owner[data.contact.geom]
         timestep = model.opt.timestep
@@ -163,10 +170,16 @@ class TouchLog:
             touch = self._open.get(pair)
             # The gap is between the last step's end and this one's beginning.
             if touch is None or time - touch.last_time - timestep >= self._rearm_time - 1e-9:
-                touch = self._begin(data, pair, int(i), time, flip=flip, before=velocity_before, walking=walking)
+                touch = self._begin(data, pair, int(i), time, flip=flip, before=velocity_before)
+                if touch.kind == Partner.PEDESTRIAN:
+                    touch.partner_velocity = people.velocity(step, velocity_before)[touch.partner].copy()
+                    touch.partner_heading = float(yaw_of_quaternion(people.quaternion[touch.partner]))
+                    touch.behind = float(people.behind()[touch.partner])
                 self._open[pair] = touch
                 self._new.append(touch)
             touch.last_time = time
+            if touch.kind == Partner.PEDESTRIAN:
+                touch.held_back = max(touch.held_back, float(people.behind()[touch.partner]) - touch.behind)
         for pair, force in forces.items():
             self._open[pair].feel(force, time=time, timestep=timestep)
         if len(pushes) > 1:
@@ -197,8 +210,8 @@ class TouchLog:
         *,
         flip: bool,
         before: Array,
-        walking: Array | None,
     ) -> Touch:
+        """The touch as far as the robots know it; a pedestrian's heading and velocity are left at 0."""
         agent, other = pair
         index = self._index
         normal = data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
@@ -210,8 +223,7 @@ class TouchLog:
             partner_velocity = before[index.qvel[partner] : index.qvel[partner] + 2].copy()
         else:
             kind, partner = Partner.PEDESTRIAN, other - index.n_agents
-            partner_heading = float(yaw_of_quaternion(data.mocap_quat[partner]))
-            partner_velocity = np.zeros(2) if walking is None else walking[partner].copy()
+            partner_heading, partner_velocity = 0.0, np.zeros(2)
         return Touch(
             agent=agent,
             kind=kind,

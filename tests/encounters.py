@@ -138,6 +138,7 @@ def encounters() -> dict[str, Encounter]:
                 "largest_impact_impulse": 8.0,
                 "push_duration": 0.2,  # 0.3 s less the 0.1 s of the impact
                 "push_impulse": 6.0,
+                "largest_held_back": 0.0,
             },
         ),
     }
@@ -185,6 +186,7 @@ ORDINARY: dict[str, float] = {
     "push_impulse": 0.0,
     "shoved_standing": 0,
     "time_shoved_standing": 0.0,
+    "largest_held_back": NAN,
     "spawn_delay": 0.0,
 }
 """Of an agent that drives 8 m straight at 1 m/s to within 0.5 m of its goal and touches nobody."""

@@ -89,6 +89,8 @@ class Touch:
     """[s]."""
     squeeze: float = 0.0
     """[N]."""
+    held_back: float = 0.0
+    """[m]."""
 
 
 def build_episode(
@@ -266,6 +268,14 @@ def _contacts(
         ),
         **{
             f"contact_{name}": np.array([getattr(touch, name) for touch, *_ in rows], dtype=float)
-            for name in ("impact_impulse", "impact_force", "push_impulse", "push_force", "peak_time", "squeeze")
+            for name in (
+                "impact_impulse",
+                "impact_force",
+                "push_impulse",
+                "push_force",
+                "peak_time",
+                "squeeze",
+                "held_back",
+            )
         },
     }

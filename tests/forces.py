@@ -1,6 +1,6 @@
-"""The table of forces in docs/metrics.md: a walker goes into a standing robot, from three sides at three speeds.
+"""The tables of forces in docs/metrics.md: a walker goes into a standing robot, from three sides at three speeds.
 
-`python tests/forces.py` writes it. The robot stands with its brakes on; the walker keeps its speed for `DURATION`.
+`python tests/forces.py` writes them. The robot stands with its brakes on; the walker keeps its speed for `DURATION`.
 """
 
 import sys
@@ -20,6 +20,7 @@ from socialnav_mj.touch import Touch
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "metrics.md"
 BEGIN, END = "<!-- Made by `python tests/forces.py`. -->\n", "<!-- End of what it makes. -->"
+BEGIN_PEOPLE = "<!-- Made by `python tests/forces.py`: both kinds of people. -->\n"
 
 SIDES = {"front": np.pi, "side": 0.5 * np.pi, "behind": 0.0}
 """Heading of the robot, towards which somebody walks along +x [rad]."""
@@ -40,6 +41,8 @@ class Case:
     """[m/s]"""
     touch: Touch
     """What the physics made of it."""
+    moved: float
+    """How far the robot was carried along [m]."""
 
     @property
     def impulse(self) -> float:
@@ -65,18 +68,19 @@ class Case:
         return float(self.speed * reduced_mass(np.array([bearing]))[0]) + self.grip
 
 
-def run(side: str, speed: float, *, physics_timestep: float = 0.01) -> Case:
+def run(side: str, speed: float, *, physics_timestep: float = 0.01, pedestrian: str = "rigid") -> Case:
     """Walk into a robot that stands.
 
     Args:
         side: Of `SIDES`.
         speed: [m/s].
         physics_timestep: [s].
+        pedestrian: Kind of the walker.
 
     Returns:
         The case with its only touch.
     """
-    scenario = Scenario(physics_timestep=physics_timestep)
+    scenario = Scenario(physics_timestep=physics_timestep, pedestrian=pedestrian)
     bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
     physics = Physics.from_mujoco(build_model(scenario, n_agent_slots=1, n_pedestrian_slots=1, **bounds))
     with physics.reset_context():
@@ -88,17 +92,18 @@ def run(side: str, speed: float, *, physics_timestep: float = 0.01) -> Case:
     path[:, 0, 0] = start + speed * physics_timestep * np.arange(steps)
     velocity = np.zeros_like(path)
     velocity[..., 0] = speed
-    physics.set_pedestrian_pose(walker, path[0], quaternion_of_yaw(np.zeros(1)))
+    physics.set_pedestrian_pose(walker, path[0], quaternion_of_yaw(np.zeros(1)), velocity[0])
     physics.set_pedestrian_contacts(walker, np.ones(1, dtype=bool))
     physics.set_pedestrian_path(path, velocity)
     physics.step(steps)
     (touch,) = physics.new_touches()
-    return Case(side=side, speed=speed, touch=touch)
+    moved = float(np.linalg.norm(physics.agent_position()[0], axis=-1))
+    return Case(side=side, speed=speed, touch=touch, moved=moved)
 
 
-def cases() -> list[Case]:
+def cases(pedestrian: str = "rigid") -> list[Case]:
     """All sides and speeds."""
-    return [run(side, speed) for side in SIDES for speed in SPEEDS]
+    return [run(side, speed, pedestrian=pedestrian) for side in SIDES for speed in SPEEDS]
 
 
 def force_table() -> str:
@@ -124,12 +129,37 @@ def force_table() -> str:
     return "\n".join(table(headings, rows))
 
 
+def people_table() -> str:
+    """The table of the two kinds of people in docs/metrics.md."""
+    headings = ["from", "walker [m/s]", "impact: impulse [N s]", "largest force [N]", "push: mean force [N]"]
+    headings += ["robot carried along [m]", "walker held back [m]"]
+    rows = [
+        [
+            rigid.side,
+            f"{rigid.speed:.1f}",
+            *(f"{one} / {two}" for one, two in zip(_of_kind(rigid), _of_kind(compliant), strict=True)),
+            f"{rigid.touch.held_back:.0f} / {compliant.touch.held_back:.3f}",
+        ]
+        for rigid, compliant in zip(cases(), cases("compliant"), strict=True)
+        if rigid.side != "behind"
+    ]
+    return "\n".join(table(headings, rows))
+
+
+def _of_kind(case: Case) -> list[str]:
+    touch = case.touch
+    mean = touch.push_impulse / touch.push_duration
+    return [f"{touch.impact_impulse:.1f}", f"{touch.impact_force:.0f}", f"{mean:.0f}", f"{case.moved:.1f}"]
+
+
 def with_table(page: str) -> str:
     """The page with the table of today between its marks."""
-    before, _, rest = page.partition(BEGIN)
-    return f"{before}{BEGIN}\n{force_table()}\n{END}{rest.partition(END)[2]}"
+    for begin, content in ((BEGIN, force_table()), (BEGIN_PEOPLE, people_table())):
+        before, _, rest = page.partition(begin)
+        page = f"{before}{begin}\n{content}\n{END}{rest.partition(END)[2]}"
+    return page
 
 
 if __name__ == "__main__":
     PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    sys.stdout.write(force_table())
+    sys.stdout.write(f"{force_table()}\n{people_table()}")

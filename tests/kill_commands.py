@@ -57,6 +57,7 @@ def _draw_coarsely() -> None:
     """Draw and resample little: neither is what is tested, and both take their time."""
     from socialnav_mj.report import style
 
+    style.DOTS_PER_INCH = 40
 
 
 def _report() -> None:

@@ -20,7 +20,19 @@ ROWS = (
     {"resources", "elementary", "geometry", "config", "files", "processes", "slots"},
     {"recordings"},
     {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
-    {"cast", "scene", "scene_index", "touch", "physics", "sample", "collision", "entrance", "task", "environment"},
+    {
+        "cast",
+        "scene",
+        "scene_index",
+        "people",
+        "touch",
+        "physics",
+        "sample",
+        "collision",
+        "entrance",
+        "task",
+        "environment",
+    },
     {"tasks"},
     {"controllers"},
     {"recorder", "rollout", "human", "evaluation"},
@@ -42,7 +54,7 @@ EXCEPTIONS = {("socialnav_mj", "tasks")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
 # dm_control's Environment in their signatures, `benchmark` times bare mj_step calls, `cli` reports PhysicsError.
 ONLY_IN = {
-    "mujoco": {"scene", "scene_index", "touch", "physics", "task", "environment", "tasks", "benchmark"},
+    "mujoco": {"scene", "scene_index", "people", "touch", "physics", "task", "environment", "tasks", "benchmark"},
     "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "benchmark", "cli", "socialnav_mj"},
     "matplotlib": {"report", "studies.paper", "studies.gains"},
     "rerun": {"trace"},
@@ -250,7 +262,19 @@ PROCESSORS_OWN = {
     *("sinh", "cosh", "cbrt", "exp2", "log2", "log10", "dot", "matmul", "inner", "vdot", "tensordot"),
 }
 STATES_DEPEND_ON = {
-    *("geometry", "recordings", "observation", "features", "cast", "sample", "entrance", "slots", "touch", "physics"),
+    *(
+        "geometry",
+        "recordings",
+        "observation",
+        "features",
+        "cast",
+        "sample",
+        "entrance",
+        "slots",
+        "people",
+        "touch",
+        "physics",
+    ),
     *("task", "environment", "controllers", "rollout", "human"),
 }
 

@@ -94,7 +94,8 @@ def test_replay_is_the_recording_at_every_physics_step(seed: int) -> None:
         assert np.isnan(now.position[empty]).all() and (now.pedestrian[empty] == NOBODY).all()
         previous = now.pedestrian
 
-        position, velocity = replay.motion(step)
+        position, velocity, walk = replay.motion(step)
+        assert walk is None  # rigid people need no mean velocity
         assert position.shape == velocity.shape == (20, cast.n_pedestrian_slots, 2)
         times = step * DT + 0.01 * np.arange(20)
         for slot in now.present:
@@ -119,7 +120,31 @@ def test_person_whose_track_ends_between_two_steps_waits_at_its_end() -> None:
     recording = recording_of(walk([(0, 0), (5, 0)], 1.0), walk([(0, 3.0), (0.8, 3.0)], 1.0, begin=0.3))
     scenario = Scenario(share=0.5)
     replay = Replay(recording, scenario, cast_recording(recording, scenario))
-    position, velocity = replay.motion(5)
+    position, velocity, _ = replay.motion(5)
     np.testing.assert_allclose(position[:, 0, 0], np.minimum(0.7 + 0.01 * np.arange(20), 0.8), atol=1e-9)
     np.testing.assert_allclose(velocity[12:, 0], 0.0, atol=1e-12)
     assert not replay.crowd(6).present.size
+
+
+def test_mean_velocity_leads_from_place_to_place_within_a_control_step_and_into_the_next() -> None:
+    recording = recording_of(*busy_crowd(12, seed=4))
+    scenario = Scenario(share=0.3, pedestrian="compliant")
+    cast = cast_recording(recording, scenario)
+    replay, met = Replay(recording, scenario, cast), 0
+    for step in range(replay._steps):
+        (_, velocity, walk), now = replay.motion(step), replay.crowd(step)
+        assert walk is not None and walk.shape == (21, cast.n_pedestrian_slots, 2)
+        before = replay.crowd(step - 1).pedestrian if step else np.full(cast.n_pedestrian_slots, NOBODY)
+        for slot in now.present:
+            i = int(now.pedestrian[slot])
+            stays, was_there = replay.crowd(step + 1).pedestrian[slot] == i, before[slot] == i
+            times = step * DT + 0.01 * np.arange(-1, 21)
+            place = recording.person(int(cast.pedestrian_index[i])).at(times)[0]
+            expected = np.diff(place, axis=0) / 0.01
+            expected[0] = expected[0] if was_there else velocity[0, slot]
+            expected[-1] = expected[-1] if stays else velocity[-1, slot]
+            np.testing.assert_allclose(walk[:, slot], expected, atol=1e-9)
+            met += was_there and not stays
+        absent = np.setdiff1d(np.arange(cast.n_pedestrian_slots), now.present)
+        assert np.isnan(walk[:, absent]).all()
+    assert met > 2

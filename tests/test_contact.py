@@ -26,6 +26,7 @@ TOUCH = Contact(
     push_force=60.0,
     peak_time=0.02,
     squeeze=12.0,
+    held_back=0.01,
 )
 
 

@@ -3,6 +3,9 @@
 import pytest
 from forces import PAGE, SIDES, SPEEDS, Case, cases, run, with_table
 
+from socialnav_mj.contact import IMPACT_DURATION
+from socialnav_mj.people import PUSHING_FORCE
+
 
 @pytest.fixture(scope="module")
 def found() -> list[Case]:
@@ -32,6 +35,16 @@ def test_shove_is_the_motors_force_along_the_wheels_and_the_tyres_grip_across(fo
 def test_impact_hardly_depends_on_the_physics_step(side: str) -> None:
     fine = run(side, 1.0, physics_timestep=0.0025)
     assert fine.touch.impact_impulse == pytest.approx(run(side, 1.0).touch.impact_impulse, rel=0.2)
+
+
+def test_walker_who_yields_gives_the_momentum_of_two_bodies_and_is_held_back() -> None:
+    """Motors that brake with 32 N add to it. The push is carried through: it takes less than the 130 N of a person."""
+    for rigid, case in zip(cases(), cases("compliant"), strict=True):
+        motors = 0.0 if case.side == "side" else 32.0 * IMPACT_DURATION
+        assert 1 / 1.5 < case.touch.impact_impulse / (case.estimate + motors) < 1.5, (case.side, case.speed)
+        assert 0.7 * rigid.moved < case.moved < rigid.moved
+        assert case.touch.push_impulse / case.touch.push_duration < PUSHING_FORCE
+        assert rigid.touch.held_back == 0.0 and 0.2 < case.touch.held_back < 0.5
 
 
 def test_page_shows_the_table_of_today() -> None:

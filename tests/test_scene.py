@@ -10,6 +10,7 @@ import pytest
 from socialnav_mj.config import Robot, Scenario
 from socialnav_mj.resources import assets_folder
 from socialnav_mj.scene import agent_name, build_model, pedestrian_name
+from socialnav_mj.scene_index import index_scene
 
 LOW, HIGH = np.array([-2.0, 3.0]), np.array([6.0, 9.0])
 
@@ -39,6 +40,18 @@ def test_scenario_decides_radii_limits_and_time_step() -> None:
     for slot in range(2):
         assert model.geom(pedestrian_name(slot) + "body").size[0] == 0.1
     assert (model.nmocap, model.nu, model.nv) == (2, 6, 24)
+
+
+def test_people_who_yield_are_bodies_of_75_kg_that_slide_and_else_the_same() -> None:
+    rigid, yielding = model_of(Scenario()), model_of(Scenario(pedestrian="compliant"))
+    assert (yielding.nmocap, yielding.nu, yielding.nv) == (0, 6, 24 + 2 * 2)
+    assert yielding.body_mass.sum() == pytest.approx(rigid.body_mass.sum() + 2 * 75.0)
+    for field in ("type", "size", "contype", "conaffinity", "friction", "solref", "solimp"):
+        geoms = [[getattr(m.geom(i), field) for i in range(m.ngeom)] for m in (rigid, yielding)]
+        np.testing.assert_array_equal(*geoms)
+    index = index_scene(yielding)
+    assert index.pedestrian_qpos.shape == index.pedestrian_qvel.shape == (2, 2)
+    assert index_scene(rigid).pedestrian_qpos.shape == (0, 2)
 
 
 def test_model_carries_the_contact_rules_that_slots_and_touches_need() -> None:

@@ -163,7 +163,7 @@ def test_person_who_appears_on_a_robot_collides_only_after_having_been_clear() -
         environment.step(still(environment))
     (collision,) = environment.task.collisions
     assert collision.touch.time == pytest.approx(2.79, abs=0.011)
-    assert environment.task.ghost_overlaps == {(0, 0)}
+    assert environment.task.ghosts.overlaps == {(0, 0)}
 
 
 def test_ghost_counts_once_for_every_robot_that_it_overlaps_and_nobody_else_does() -> None:
@@ -172,9 +172,9 @@ def test_ghost_counts_once_for_every_robot_that_it_overlaps_and_nobody_else_does
     robots = walk([(0, 0), (9, 0)], 1.0), walk([(0, 0.4), (9, 0.4)], 1.0), walk([(0, 3), (9, 3)], 1.0)
     environment = environment_of(*robots, ghost, walk([(1, -2), (1, 8)], 1.0), agents=[1, 2, 3])
     wait(environment, 30)
-    assert environment.task.ghost_overlaps == {(0, 0), (1, 0)}
+    assert environment.task.ghosts.overlaps == {(0, 0), (1, 0)}
     environment.reset()
-    assert environment.task.ghost_overlaps == set()
+    assert environment.task.ghosts.overlaps == set()
 
 
 def test_overlap_with_a_ghost_is_recorded_and_takes_success_only_where_ghosts_count() -> None:
@@ -194,7 +194,7 @@ def test_person_who_appears_on_a_robot_and_leaves_has_never_touched_it() -> None
     environment = environment_of(walk([(0, 0), (9, 0)], 1.0), person, agents=[1])
     wait(environment, 30)
     assert not environment.task.collisions
-    assert environment.task.ghost_overlaps == {(0, 0)}
+    assert environment.task.ghosts.overlaps == {(0, 0)}
 
 
 def test_new_person_in_a_used_slot_touches_anew() -> None:

@@ -213,6 +213,7 @@ def test_keywords_become_the_scenario() -> None:
         "share": 0.5,
         "seed": 8,
         "pedestrian_radius": 0.2,
+        "pedestrian": "compliant",
         "turn_limit": "per_second",
         "on_collision": "retire",
         "control_timestep": 0.1,

@@ -191,10 +191,12 @@ class WatchedPhysics(Physics):
 
     def step(self, nstep: int = 1) -> None:
         """Step one by one."""
-        path, velocity = self._path, self._path_velocity
+        path, velocity, walk = self._path
         for k in range(nstep):
             if path is not None:
-                self.set_pedestrian_path(path[k : k + 1], velocity[k : k + 1])
+                self.set_pedestrian_path(
+                    path[k : k + 1], velocity[k : k + 1], None if walk is None else walk[k : k + 2]
+                )
             super().step(1)
             self._look()
 
@@ -229,8 +231,8 @@ class WatchedPhysics(Physics):
             Which robots touch two bodies at once, or did so before this step; shape (n_agents,).
         """
         solid = np.concatenate([robots, self.model.geom_contype[self._index.pedestrian_geom] > 0])
-        at, people = self.agent_position(), self.data.mocap_pos[:, :2].copy()
-        offset = np.concatenate([at, people]) - at[:, None]
+        at = self.agent_position()
+        offset = np.concatenate([at, self.pedestrian_position()]) - at[:, None]
         distance = np.linalg.norm(offset, axis=-1)
         overlap = robots[:, None] & solid & (distance < self._reach)
         np.fill_diagonal(overlap, False)

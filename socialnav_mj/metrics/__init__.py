@@ -10,6 +10,7 @@ from socialnav_mj.metrics.contacts import Fault
 from socialnav_mj.metrics.faults import collisions_by_fault, largest_closing_speed, repeated_collisions, struck_standing
 from socialnav_mj.metrics.forces import (
     collisions_by_severity,
+    largest_held_back,
     largest_impact_force,
     largest_impact_impulse,
     push_duration,
@@ -94,6 +95,7 @@ __all__ = [
     "intimate_intrusions",
     "intrusion_share",
     "largest_closing_speed",
+    "largest_held_back",
     "largest_impact_force",
     "largest_impact_impulse",
     "maximum_acceleration",

@@ -29,8 +29,8 @@ class Fault(IntEnum):
 def approach_speeds(episode: Episode) -> tuple[Array, Array]:
     """Each party's own speed towards the other along the contact normal, just before they touch.
 
-    Their sum is `Episode.contact_closing_speed`. A pedestrian's velocity is the recorded one: to the solver its mocap
-    body stands still.
+    Their sum is `Episode.contact_closing_speed`. A rigid pedestrian's velocity is the recorded one: to the solver its
+    mocap body stands still.
 
     Args:
         episode: Record with k contacts; their normals and both velocities are used.

@@ -102,6 +102,19 @@ def time_shoved_standing(episode: Episode) -> Array:
     return _sum(episode, np.where(shoved(episode), episode.contact_push_duration, 0.0))
 
 
+def largest_held_back(episode: Episode) -> Array:
+    """How far a pedestrian that the agent collided with was held back from its recorded place during the collision.
+
+    Args:
+        episode: Record whose contacts have the distance by which a pedestrian fell behind.
+
+    Returns:
+        Shape (n_agents,), the largest of its collisions with people; 0 where people are rigid, NaN for agents without
+        such a collision and in the human row [m].
+    """
+    return largest_of(episode, np.where(_with_people(episode), episode.contact_held_back, np.nan))
+
+
 def wedged_collisions(episode: Episode) -> NDArray[np.int64]:
     """Number of collisions in which a robot was held between bodies that did not yield; see `severity.wedged`.
 
@@ -127,7 +140,7 @@ def collisions_by_severity(episode: Episode, what: Severity) -> Array:
         Shape (n_agents,), whole numbers; NaN for agents with a collision without physics (human row).
     """
     force = episode.contact_impact_force
-    unknown = number_of(episode, (episode.contact_partner_kind == Partner.PEDESTRIAN) & np.isnan(force)) > 0
+    unknown = number_of(episode, _with_people(episode) & np.isnan(force)) > 0
     return np.where(unknown, np.nan, number_of(episode, severity(episode, force) == what))
 
 
@@ -140,13 +153,20 @@ def _sum(episode: Episode, values: Array) -> Array:
     return result
 
 
+def _with_people(episode: Episode) -> NDArray[np.bool_]:
+    return episode.contact_partner_kind == Partner.PEDESTRIAN
+
+
+def _no_collision_with_a_body_of_a_person(episode: Episode) -> NDArray[np.bool_]:
+    return number_of(episode, _with_people(episode) & np.isfinite(episode.contact_held_back)) == 0
+
+
 def _no_collision_with_a_force(episode: Episode) -> NDArray[np.bool_]:
     return number_of(episode, np.isfinite(episode.contact_impact_force) & ~clamped(episode)) == 0
 
 
 def _a_collision_without_force(episode: Episode) -> NDArray[np.bool_]:
-    with_people = episode.contact_partner_kind == Partner.PEDESTRIAN
-    return number_of(episode, with_people & np.isnan(episode.contact_impact_force)) > 0
+    return number_of(episode, _with_people(episode) & np.isnan(episode.contact_impact_force)) > 0
 
 
 def _a_collision_without_physics(episode: Episode) -> NDArray[np.bool_]:
@@ -245,5 +265,18 @@ METRICS = (
         needs=(Need.CONTACTS, Need.FORCES),
         formula="push duration of these collisions",
         source="below",
+    ),
+    Metric(
+        name="largest_held_back",
+        function=largest_held_back,
+        unit="m",
+        low=0.0,
+        better=Better.LESS,
+        missing=Missing(
+            rule="no collision with people, or no physics (human row)", where=_no_collision_with_a_body_of_a_person
+        ),
+        needs=(Need.CONTACTS, Need.FORCES),
+        formula="growth of a pedestrian's distance from its recorded place during a collision; 0 for rigid ones",
+        source="ours; below",
     ),
 )

@@ -48,6 +48,7 @@ CONTACT_SCHEMA = pa.schema(
         ("push_impulse", pa.float64()),
         ("push_force", pa.float64()),
         ("peak_time", pa.float64()),
+        ("held_back", pa.float64()),
         ("squeeze", pa.float64()),
         ("clamped", pa.bool_()),
         ("wedged", pa.bool_()),

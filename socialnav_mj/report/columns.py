@@ -119,6 +119,7 @@ ORDER = (
     "push_impulse",
     "shoved_standing",
     "time_shoved_standing",
+    "largest_held_back",
 )
 """Places that metrics and measures keep, so that tables of before and after can be laid side by side."""
 
