@@ -10,9 +10,10 @@ from test_protocol import Walks, actions
 from test_robot import World
 
 from socialnav_mj.controllers import Limits, controller_config, controller_of, make_controller
-from socialnav_mj.controllers.mpc import MPC, PRESETS
+from socialnav_mj.controllers.mpc import MPC, PRESETS, WEIGHTS
 from socialnav_mj.controllers.planning import loops
 from socialnav_mj.controllers.planning.arrays import plan_costs
+from socialnav_mj.controllers.planning.entrances import Entrances
 from socialnav_mj.controllers.planning.foresight import MOST_NEIGHBOURS, Foresight
 from socialnav_mj.controllers.planning.search import KEPT, SAMPLES, library, search
 from socialnav_mj.controllers.planning.terms import Crowd, terms_of
@@ -23,7 +24,8 @@ from socialnav_mj.metrics.proximity import nearest_pedestrian_distance
 from socialnav_mj.rollout import rollout
 
 TERMS = terms_of(LIMITS, steps=16)
-EMPTY = Crowd(np.zeros((1, 17, 0)), np.zeros((1, 17, 0)), *3 * [np.zeros((1, 0))])
+NO_ENTRANCES = 3 * [np.zeros((1, 0))]
+EMPTY = Crowd(np.zeros((1, 17, 0)), np.zeros((1, 17, 0)), *3 * [np.zeros((1, 0))], *NO_ENTRANCES)
 
 
 def crowd_at(places, velocities=None, clearance=6.0, zone=0.0, contact=0.32):
@@ -32,7 +34,7 @@ def crowd_at(places, velocities=None, clearance=6.0, zone=0.0, contact=0.32):
     velocities = np.zeros_like(places) if velocities is None else np.asarray(velocities, dtype=float)
     path = places + STEP * np.arange(17)[:, None, None] * velocities
     numbers = [np.full((1, len(places)), value) for value in (contact, clearance, zone)]
-    return Crowd(path[None, ..., 0], path[None, ..., 1], *numbers)
+    return Crowd(path[None, ..., 0], path[None, ..., 1], *numbers, *NO_ENTRANCES)
 
 
 def cost_of(plan, crowd=EMPTY, goal=(5.0, 0.0), speed=1.0):
@@ -125,6 +127,16 @@ def test_clearance_is_half_the_sum_and_half_the_worst_of_others():
     assert min(single) > 0.0 and both == pytest.approx(0.5 * sum(single) + 0.5 * max(single))
 
 
+def test_standing_where_somebody_may_appear_costs_the_decayed_time():
+    """On the spot all of it, 0.565 m beside it (1 - 1/4)^4, beyond 1.13 m nothing."""
+    plan, whole = (0.0, 0.0, 9.0, 0.0, 1.0), TERMS.zone_time.sum()
+    for distance, share in ((0.0, 1.0), (0.565, 0.75**4), (1.2, 0.0)):
+        crowd = EMPTY._replace(entrance_x=np.zeros((1, 1)), entrance_y=np.full((1, 1), distance))
+        crowd = crowd._replace(entrance_weight=np.full((1, 1), 2.0))
+        added = cost_of(plan, crowd, speed=0.0)[0] - cost_of(plan, speed=0.0)[0]
+        assert added == pytest.approx(2.0 * whole * share, abs=1e-12)
+
+
 def random_problem(seed, n=6, k=9, p=40):
     """Plans of agents in a random crowd."""
     random = np.random.default_rng(seed)
@@ -132,7 +144,9 @@ def random_problem(seed, n=6, k=9, p=40):
     path = path + STEP * np.arange(17)[:, None, None] * random.normal(0.0, 0.8, (n, 1, k, 2))
     weight = np.where(random.random((n, k)) < 0.8, random.uniform(0.0, 8.0, (n, k)), 0.0)
     zone = np.where(random.random((n, k)) < 0.5, random.uniform(0.0, 1.0, (n, k)), 0.0)
-    crowd = Crowd(path[..., 0].copy(), path[..., 1].copy(), random.uniform(0.2, 0.4, (n, k)), weight, zone)
+    entrances = [*random.uniform(-3.0, 3.0, (2, n, 4)), random.uniform(0.0, 0.5, (n, 4))]
+    contact = random.uniform(0.2, 0.4, (n, k))
+    crowd = Crowd(path[..., 0].copy(), path[..., 1].copy(), contact, weight, zone, *entrances)
     span = np.array([[-4.0, 0.0, 0.0, -1.0, 0.0], [4.0, 1.0, 2.5, 1.0, 1.0]])
     plans = random.uniform(*span, (n, p, 5))
     speed, yaw_rate = random.uniform(-0.2, 1.3, n), random.uniform(-3.0, 3.0, n)
@@ -235,6 +249,29 @@ def test_tracks_forget_when_somebody_else_is_in_the_column(newcomer):
     np.testing.assert_allclose(found[0, 0], [[0.0, 0.5], [0.0, 0.5]], atol=1e-12)
 
 
+def test_tracks_report_who_appears_before_the_eyes_of_an_agent_that_was_there():
+    tracks, pair = Tracks(depth=8), [(2.0, 1.0), (1.0, -1.0)]
+    seen = [observation(pedestrians=pair) for _ in range(3)]
+    for k, there in enumerate((1, 1, 2)):
+        seen[k]["pedestrian_mask"][0, there:] = False
+        seen[k]["position"][0], seen[k]["heading"][0] = (5.0, 5.0), np.pi / 2.0
+    assert tracks.update(seen[0], elapsed=0.2).shape == (0, 2)  # there before anybody looked
+    assert tracks.update(seen[1], elapsed=0.2).shape == (0, 2)
+    np.testing.assert_allclose(tracks.update(seen[2], elapsed=0.2), [[6.0, 6.0]], atol=1e-12)
+
+
+def test_entrances_count_who_appeared_near_and_how_often():
+    """Three at nearly one place and one 1 m beside it in 10 s; 20 s are added. A place 5 m away is not told."""
+    entrances = Entrances()
+    entrances.note(np.array([[1.0, 0.0], [1.1, 0.1], [1.0, 1.0], [6.0, 0.0]]), elapsed=4.0)
+    entrances.note(np.array([[1.0, 0.2]]), elapsed=6.0)
+    x, y, frequency = entrances.around(np.array([[1.0, -1.0], [5.5, 0.0]]), np.array([np.pi / 2.0, 0.0]))
+    np.testing.assert_allclose([*x[0], x[1, 0]], [1.0, 2.0, 0.5], atol=1e-12)
+    np.testing.assert_allclose(y[0], [0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(frequency, [[3.0 / 30.0, 1.0 / 30.0], [1.0 / 30.0, 0.0]])
+    assert Entrances().around(np.zeros((2, 2)), np.zeros(2))[0].shape == (2, 0)
+
+
 def test_prediction_is_the_sum_over_lagged_velocities_by_hand():
     coefficients = np.zeros((2, len(LAGS)))
     coefficients[0, [0, 2]], coefficients[1, 5] = (0.3, -0.1), 0.4
@@ -317,7 +354,7 @@ def test_mpc_says_what_is_allowed(kwargs, named):
 def test_presets_are_weights_and_a_weight_that_is_given_stays():
     for preset, weights in PRESETS.items():
         controller = make_controller(f"mpc(preset={preset!r})")
-        assert (controller.person_weight, controller.agent_weight, controller.zone_weight) == weights
+        assert tuple(getattr(controller, f"{kind}_weight") for kind in WEIGHTS) == weights
         assert controller.name == f"mpc(preset={preset!r})"
         assert controller_of(controller_config(controller)) == controller
     mixed = make_controller("mpc(preset='calm', zone_weight=0.5)")

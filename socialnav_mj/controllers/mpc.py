@@ -18,12 +18,13 @@ from socialnav_mj.geometry import Array, wrap_angle
 
 Preset = Literal["social", "free", "calm"]
 
-PRESETS: dict[str, tuple[float, float, float]] = {
-    "social": (6.0, 4.0, 0.35),
-    "free": (6.0, 4.0, 0.0),
-    "calm": (8.0, 4.0, 1.0),
+WEIGHTS = ("person", "agent", "zone", "entrance")
+PRESETS: dict[str, tuple[float, float, float, float]] = {
+    "social": (6.0, 4.0, 0.35, 25.0),
+    "free": (6.0, 4.0, 0.0, 25.0),
+    "calm": (8.0, 4.0, 1.0, 25.0),
 }
-"""person_weight, agent_weight and zone_weight of each preset; chosen on draws 0-9 of students003."""
+"""Weights of `WEIGHTS` in each preset; chosen on draws 0-9 of students003."""
 STEPS = 16
 """Of the horizon, of 0.2 s each: 3.2 s; chosen on draws 0-9 of students003."""
 
@@ -45,6 +46,8 @@ class MPC(TwistController):
     """Cost of touching an agent now, >= 0 [s]."""
     zone_weight: float | None = None
     """Cost of a second within 1.3 m of a person, >= 0 [1]."""
+    entrance_weight: float | None = None
+    """Cost of a second where somebody appears once a second, >= 0 [1]."""
     prediction: str = "linear"
     """As `prediction.load_prediction` takes it."""
     name: str = "mpc"
@@ -53,7 +56,8 @@ class MPC(TwistController):
     def __post_init__(self) -> None:
         if self.preset not in get_args(Preset):
             raise ValueError(f"preset = {self.preset!r} is not allowed; allowed: {', '.join(get_args(Preset))}")
-        for name, own in zip(("person_weight", "agent_weight", "zone_weight"), PRESETS[self.preset], strict=True):
+        names = (f"{kind}_weight" for kind in WEIGHTS)
+        for name, own in zip(names, PRESETS[self.preset], strict=True):
             given = getattr(self, name)
             if given is None:
                 setattr(self, name, own)
@@ -120,13 +124,18 @@ class MPC(TwistController):
 
     def _crowd(self, ahead: Ahead) -> Crowd:
         person, real = ahead.person, ahead.real
-        weight: dict[str, Any] = {kind: getattr(self, f"{kind}_weight") for kind in ("person", "agent", "zone")}
+        weight: dict[str, Any] = {kind: getattr(self, f"{kind}_weight") for kind in WEIGHTS}
+        none = slice(None if weight["entrance"] else 0)
+        entrance_x, entrance_y, frequency = (np.ascontiguousarray(own[:, none]) for own in ahead.entrance)
         return Crowd(
             x=np.ascontiguousarray(ahead.path[..., 0]),
             y=np.ascontiguousarray(ahead.path[..., 1]),
             contact=np.where(person, self.limits.contact_distance, self.limits.agent_contact_distance),
             clearance_weight=np.where(real, np.where(person, weight["person"], weight["agent"]), 0.0),
             zone_weight=np.where(real & person, weight["zone"], 0.0),
+            entrance_x=entrance_x,
+            entrance_y=entrance_y,
+            entrance_weight=weight["entrance"] * frequency,
         )
 
     def _costs(

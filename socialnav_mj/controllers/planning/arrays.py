@@ -3,6 +3,7 @@
 import numpy as np
 
 from socialnav_mj.controllers.planning.loops import (
+    at_entrance,
     bearing,
     closest,
     inside,
@@ -24,8 +25,8 @@ def plan_costs(
 
     A plan heads for psi_1 at speed v_1 until t_1, then for the goal's bearing plus psi_2 at v_2. Its cost is the time
     to the goal, or the horizon with what is left of the way at full speed and a little for not facing the goal; half
-    the sum and half the maximum, over others, of the worst lack of clearance; and the time that each person is in the
-    zone.
+    the sum and half the maximum, over others, of the worst lack of clearance; the time that each person is in the
+    zone, and the time where somebody may appear.
 
     Args:
         plans: (n, p, 5) psi_1 [rad], v_1 [m/s], t_1 [s], psi_2 [rad], v_2 [m/s].
@@ -72,6 +73,9 @@ def plan_costs(
         counted = np.maximum(worst, crowd.clearance_weight[:, None] * lack)
         worst = np.where(under_way[..., None], counted, worst)
         weighted = _sum(crowd.zone_weight[:, None] * inside(distance, terms))
+        for e in range(crowd.entrance_x.shape[1]):
+            there = at_entrance(crowd.entrance_x[:, e, None] - next_x, crowd.entrance_y[:, e, None] - next_y, terms)
+            weighted = weighted + crowd.entrance_weight[:, e, None] * there
         within = np.where(under_way, within + weighted * terms.zone_time[k], within)
         x, y = next_x, next_y
         to_x, to_y = goal[:, :1] - x, goal[:, 1:] - y

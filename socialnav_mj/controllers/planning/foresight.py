@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Limits, Observation
+from socialnav_mj.controllers.planning.entrances import Entrances
 from socialnav_mj.controllers.planning.tracks import Tracks, seen_by
 from socialnav_mj.controllers.prediction import LAGS, STEP, Prediction, constant_velocity
 from socialnav_mj.geometry import Array
@@ -27,6 +28,8 @@ class Ahead(NamedTuple):
     """(n, k) there is somebody."""
     person: NDArray[np.bool_]
     """(n, k) it is a pedestrian, not an agent."""
+    entrance: tuple[Array, Array, Array]
+    """As `Entrances.around` returns it."""
 
 
 class Foresight:
@@ -44,6 +47,7 @@ class Foresight:
         self._steps, self._elapsed = steps, limits.control_timestep
         self._lags = [round(lag * STEP / limits.control_timestep) for lag in LAGS]
         self._tracks = Tracks(depth=max(self._lags))
+        self._entrances = Entrances()
 
     def look(self, observation: Observation) -> Ahead:
         """Take in what is seen at a control step, and predict.
@@ -55,7 +59,7 @@ class Foresight:
             A row for each active agent, in the order of their slots.
         """
         rows = np.flatnonzero(observation["active"])
-        self._tracks.update(observation, elapsed=self._elapsed)
+        self._entrances.note(self._tracks.update(observation, elapsed=self._elapsed), elapsed=self._elapsed)
         position, _, there = seen_by(observation, rows)
         columns, real = _nearest(position, there)
         velocity = self._tracks.velocities(observation, rows, columns, self._lags)
@@ -65,7 +69,8 @@ class Foresight:
         moved = np.where(person[..., None, None], people, agents)
         path = np.concatenate([here, here + moved], axis=2).swapaxes(1, 2)
         path = np.where(real[:, None, :, None], path, NOWHERE)
-        return Ahead(path=path, real=real, person=person)
+        entrance = self._entrances.around(observation["position"][rows], observation["heading"][rows])
+        return Ahead(path=path, real=real, person=person, entrance=entrance)
 
 
 def _nearest(position: Array, there: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

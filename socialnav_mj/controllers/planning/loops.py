@@ -98,6 +98,12 @@ def inside(distance: Any, terms: Terms) -> Any:
     return _smaller(_larger((terms.zone - distance) / terms.zone_width, 0.0), 1.0)
 
 
+def at_entrance(x: Any, y: Any, terms: Terms) -> Any:
+    """Whether a place is where somebody may appear: 1 there, falling to 0 at the radius, by distances (x, y)."""
+    q = _larger(1.0 - (x * x + y * y) / (terms.entrance_radius * terms.entrance_radius), 0.0)
+    return (q * q) * (q * q)
+
+
 def loop_costs(
     plans: Array, speed: Array, yaw_rate: Array, goal: Array, crowd: Crowd, terms: Terms, best: Array
 ) -> tuple[Array, Array]:
@@ -119,7 +125,8 @@ def loop_costs(
         As there; both are infinite for plans that were given up.
     """
     n, p, _ = plans.shape
-    steps, others = len(terms.margin), crowd.contact.shape[1]
+    steps, others, entrances = len(terms.margin), crowd.contact.shape[1], crowd.entrance_x.shape[1]
+    square = terms.entrance_radius * terms.entrance_radius
     costs, clearances = np.full((n, p), np.inf), np.full((n, p), np.inf)
     near, count = np.empty((steps, others), dtype=np.int64), np.empty(steps, dtype=np.int64)
     cut, worst = np.empty((steps, others)), np.empty(others)
@@ -177,6 +184,10 @@ def loop_costs(
                         total, most = total + (lack - worst[j]), _larger(most, lack)
                         worst[j] = lack
                     weighted = weighted + crowd.zone_weight[i, j] * inside(distance, terms)
+                for e in range(entrances):
+                    from_x, from_y = crowd.entrance_x[i, e] - next_x, crowd.entrance_y[i, e] - next_y
+                    if from_x * from_x + from_y * from_y < square:
+                        weighted = weighted + crowd.entrance_weight[i, e] * at_entrance(from_x, from_y, terms)
                 within = within + weighted * terms.zone_time[k]
                 x, y = next_x, next_y
                 to_x, to_y = goal[i, 0] - x, goal[i, 1] - y
@@ -228,7 +239,18 @@ def compiled() -> Callable[..., tuple[Array, Array]] | None:
     overload(_larger)(lambda a, b: lambda a, b: a if a > b else b)
     overload(_either)(lambda condition, a, b: lambda condition, a, b: a if condition else b)
     overload(_root)(lambda a: lambda a: math.sqrt(a))
-    formulas = (sine_cosine, small_sine_cosine, bearing, yaw_command, turn_made, speed_gained, closest, lacking, inside)
+    formulas = (
+        sine_cosine,
+        small_sine_cosine,
+        bearing,
+        yaw_command,
+        turn_made,
+        speed_gained,
+        closest,
+        lacking,
+        inside,
+        at_entrance,
+    )
     for formula in formulas:
         register_jitable(formula)
     try:

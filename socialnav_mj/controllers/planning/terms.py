@@ -38,6 +38,8 @@ ZONE_WIDTH = 0.3
 """Over which that cost rises from 0 to its weight [m]."""
 ZONE_TIME = 4.0
 """Over which it decays to 1/e [s]."""
+ENTRANCE_RADIUS = 1.13
+"""Where the cost of being where somebody may appear ends; it is nearly a normal density with sd 0.4 m [m]."""
 HEADING_WEIGHT = 0.15
 """Cost of not facing the goal at the end of the horizon [s/rad]."""
 ARRIVAL_DISTANCE = 0.5
@@ -57,6 +59,12 @@ class Crowd(NamedTuple):
     """(n, k) cost of touching now [s]."""
     zone_weight: Array
     """(n, k) cost of a second within the zone [1]."""
+    entrance_x: Array
+    """(n, e) places where somebody may appear, ahead [m]."""
+    entrance_y: Array
+    """(n, e) to the left [m]."""
+    entrance_weight: Array
+    """(n, e) cost of a second there [1]."""
 
 
 class Terms(NamedTuple):
@@ -80,6 +88,7 @@ class Terms(NamedTuple):
     zone_width: float
     zone_time: Array
     """(steps,) by which a step in the zone counts [s]."""
+    entrance_radius: float
     heading_weight: float
     arrival_distance: float
 
@@ -111,6 +120,7 @@ def terms_of(limits: Limits, *, steps: int) -> Terms:
         zone=ZONE,
         zone_width=ZONE_WIDTH,
         zone_time=STEP * exp(-ahead / ZONE_TIME),
+        entrance_radius=ENTRANCE_RADIUS,
         heading_weight=HEADING_WEIGHT,
         arrival_distance=ARRIVAL_DISTANCE,
     )

@@ -52,12 +52,16 @@ class Tracks:
         self._person = np.empty(0, dtype=np.int64)
         self._age = np.zeros((0, 0), dtype=np.int64)
 
-    def update(self, observation: Observation, *, elapsed: float) -> None:
+    def update(self, observation: Observation, *, elapsed: float) -> Array:
         """Take in what is seen at a control step.
 
         Args:
             observation: Keys as in `socialnav_mj.observation`.
             elapsed: Time since the last update [s].
+
+        Returns:
+            Where those are who appeared since the last update, before the eyes of an agent that was there before them,
+            (k, 2), world frame [m].
         """
         person = np.where(observation["active"], observation["person"], -1)
         columns = observation["pedestrian_mask"].shape[1] + observation["agent_mask"].shape[1]
@@ -72,7 +76,8 @@ class Tracks:
         place = observation["position"][rows, None] + _to_world(position, heading)
         expected = self._place[rows] + elapsed * self._velocity[self._now][rows]
         gap = place - expected
-        same = there & (self._person[rows] == person[rows])[:, None]
+        watched = self._person[rows] == person[rows]
+        same = there & watched[:, None] & (self._age[rows] >= 0)
         same &= np.hypot(gap[..., 0], gap[..., 1]) <= LONGEST_JUMP
         age = np.full_like(self._age, -1)
         age[rows] = np.where(there, np.where(same, self._age[rows] + 1, 0), -1)
@@ -80,6 +85,9 @@ class Tracks:
         self._age, self._person = age, person
         self._place[rows] = place
         self._velocity[self._now][rows] = _to_world(velocity, heading)
+        appeared = there & ~same & watched[:, None]
+        newcomer = np.flatnonzero(appeared.any(axis=0))
+        return place[appeared[:, newcomer].argmax(axis=0), newcomer] if newcomer.size else np.empty((0, 2))
 
     def velocities(
         self, observation: Observation, rows: NDArray[np.int64], columns: NDArray[np.int64], lags: Sequence[int]
