@@ -185,7 +185,7 @@ class WatchedPhysics(Physics):
         self._entry, self._nearest = np.full((*shape, 2), np.nan), np.full(shape, np.inf)
         self._overlap = np.zeros(shape, dtype=bool)
         self._held_back = np.zeros(shape, dtype=bool)
-        self._people = np.full((self.n_pedestrians, 2), np.nan)
+        self._people_before = np.full((self.n_pedestrians, 2), np.nan)
         self._thrown = np.zeros(self.n_agents, dtype=bool)
         self._slow = max(FASTEST, scenario.robot.max_speed)
 
@@ -231,14 +231,14 @@ class WatchedPhysics(Physics):
             Which robots touch two bodies at once, or did so before this step; shape (n_agents,).
         """
         solid = np.concatenate([robots, self.model.geom_contype[self._index.pedestrian_geom] > 0])
-        at = self.agent_position()
-        offset = np.concatenate([at, self.pedestrian_position()]) - at[:, None]
+        at, people = self.agent_position(), self.pedestrian_position()
+        offset = np.concatenate([at, people]) - at[:, None]
         distance = np.linalg.norm(offset, axis=-1)
         overlap = robots[:, None] & solid & (distance < self._reach)
         np.fill_diagonal(overlap, False)
         timestep = self.model.opt.timestep
         begun, loose = overlap & ~self._overlap, np.linalg.norm(offset - self._offset, axis=-1) > 0.25 * self._reach
-        walking = np.linalg.norm(people - self._people, axis=1) / timestep
+        walking = np.linalg.norm(people - self._people_before, axis=1) / timestep
         loose[:, self.n_agents :] |= walking > stopped_speed(self._task.scenario.contact_distance, timestep)
         squeezed = (overlap.sum(axis=1) > 1) | (self._overlap.sum(axis=1) > 1)
         self._held_back |= squeezed[:, None]
@@ -250,7 +250,7 @@ class WatchedPhysics(Physics):
         self.tunnels += int((through & ~self._held_back).sum())
         self.squeezed_tunnels += int((through & self._held_back).sum())
         self._entry[through] = np.nan
-        self._offset, self._overlap, self._people = offset, overlap, people
+        self._offset, self._overlap, self._people_before = offset, overlap, people
         return squeezed
 
 
