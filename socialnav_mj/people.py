@@ -24,6 +24,10 @@ than a twentieth [s]."""
 CATCH_UP_SPEED = 0.5
 """But no faster than that beyond the recorded velocity: from 1.3 m/s, a usual walk, to 1.8 m/s, a brisk one [m/s]."""
 
+JUMP_SPEED = 5.0
+"""Whose recorded place moves faster than anybody runs in a crowd has jumped; the body is put there, not driven: the
+blow of 75 kg at such a speed would be the recording's fault, and throws robots out of the numbers [m/s]."""
+
 
 class People(Protocol):
     """How the people of a scene are moved; a row for every pedestrian slot."""
@@ -149,7 +153,7 @@ class CompliantPeople:
     In every physics step a body gets the force m a that the recorded acceleration a takes, so that who meets nobody is
     where the recording has them. Besides, it gets m (w - v) / `RELAXATION_TIME`, but no more than `PUSHING_FORCE`: v is
     its velocity, and w the one it wants, the recorded one and the way back to the recorded place in `CATCH_UP_TIME`, at
-    `CATCH_UP_SPEED` at most. That is a spring and a damper.
+    `CATCH_UP_SPEED` at most. That is a spring and a damper. Who jumps in the recording is put where it jumps to.
     """
 
     def __init__(self, index: SceneIndex, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -165,6 +169,7 @@ class CompliantPeople:
         self._mass = model.body_mass[index.pedestrian_carrier][:, None].copy()
         self._target = self._walk = self._inertia = np.zeros((1, index.n_pedestrians, 2))
         self._behind = np.zeros(index.n_pedestrians)
+        self._jumps = np.zeros((1, index.n_pedestrians), dtype=bool)
 
     @property
     def quaternion(self) -> Array:
@@ -207,6 +212,7 @@ class CompliantPeople:
             walk = np.concatenate([2.0 * recorded[:1] - before, inside, 2.0 * recorded[-1:] - after])
         walk = np.nan_to_num(walk)
         self._walk = walk
+        self._jumps = np.linalg.norm(walk, axis=2) > JUMP_SPEED
         self._inertia = self._mass * np.diff(walk, axis=0) / timestep
 
     def advance(self, step: int) -> None:
@@ -218,6 +224,12 @@ class CompliantPeople:
         wanted = self._walk[step] + _limited(lag / CATCH_UP_TIME, CATCH_UP_SPEED)
         push = self._mass * (wanted - data.qvel[index.pedestrian_qvel]) / RELAXATION_TIME
         data.qfrc_applied[index.pedestrian_qvel] = self._inertia[step] + _limited(push, PUSHING_FORCE)
+        jumped = np.flatnonzero(self._jumps[step] | self._jumps[step + 1])
+        if jumped.size:
+            velocity = np.where(self._jumps[step + 1][jumped, None], 0.0, self._walk[step + 1][jumped])
+            data.qpos[index.pedestrian_qpos[jumped]] = self._target[step][jumped] - self._origin[jumped]
+            data.qvel[index.pedestrian_qvel[jumped]] = velocity
+            data.qfrc_applied[index.pedestrian_qvel[jumped]] = 0.0
 
     def velocity(self, step: int, before: Array) -> Array:
         """See `People`; the body's own."""

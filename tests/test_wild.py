@@ -21,6 +21,11 @@ def test_wild_episode_breaks_no_rule(seed: int) -> None:
     assert "1 episodes, " in summary([run]) and "0 episodes broke a rule" in summary([run])
 
 
+def test_jumping_crowd_of_people_who_yield_leaves_the_numbers_finite() -> None:
+    run = run_wild(0, pedestrian="compliant")  # somebody who is driven along a jump throws a robot out of the numbers
+    assert run.broken == [] and len(run.episode.contact_time)
+
+
 @pytest.mark.slow
 def test_hundred_wild_episodes_break_no_rule() -> None:
     assert main(["--episodes", "100", "--seed", "10000", "--jobs", "-1"]) == 0

@@ -7,7 +7,7 @@ seed is always the same, and `--episodes 1 --seed K` repeats the one that a fail
 import argparse
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -337,17 +337,18 @@ def thrown_out(timestep: float) -> float:
     return fastest
 
 
-def run_wild(seed: int) -> Run:
+def run_wild(seed: int, *, pedestrian: str = "rigid") -> Run:
     """Make and run one wild episode, every fourth one twice, and hold it to the rules.
 
     Args:
         seed: Of everything in it.
+        pedestrian: Kind of the people.
 
     Returns:
         What happened; its list of what broke is empty if all is well.
     """
     random = np.random.default_rng(seed)
-    recording, scenario = wild_recording(random), wild_scenario(random)
+    recording, scenario = wild_recording(random), replace(wild_scenario(random), pedestrian=pedestrian)
     controller = wild_controller(random)
     plain = build_environment(recording, scenario)
     watched = WatchedPhysics.from_mujoco(plain.physics.model.ptr)
