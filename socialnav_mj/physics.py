@@ -15,8 +15,7 @@ from socialnav_mj.scene import REARM_TIME, agent_name, pedestrian_name
 from socialnav_mj.scene_index import index_scene
 from socialnav_mj.touch import Touch, TouchLog
 
-_SLEEP_NEVER = int(mujoco.mjtSleepPolicy.mjSLEEP_NEVER)
-_SLEEP_ALLOWED = int(mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED)
+_SLEEP = mujoco.mjtSleepPolicy
 
 
 class Physics(MujocoPhysics):
@@ -161,7 +160,7 @@ class Physics(MujocoPhysics):
         self._set_contacts(self._index.agent_geoms[slot], present)
         tree = self._index.agent_tree[slot]
         # Only who is parked may sleep, since a sleeping robot would not listen to its command; its new place wakes it.
-        model.ptr.tree_sleep_policy[tree] = _SLEEP_NEVER if present else _SLEEP_ALLOWED
+        model.ptr.tree_sleep_policy[tree] = _SLEEP.mjSLEEP_NEVER if present else _SLEEP.mjSLEEP_ALLOWED
 
     # Pedestrians
 
