@@ -42,7 +42,7 @@ ROWS = (
     {"learning"},
     {"studies"},
     {"studies.paper", "studies.leave_one_out"},
-    {"studies.gains"},
+    {"studies.gains", "studies.leaderboard"},
     {"benchmark", "resimulation", "verification", "cli"},
 )
 # A study uses what all studies share, and no other study.
@@ -56,7 +56,7 @@ EXCEPTIONS = {("socialnav_mj", "tasks")}
 ONLY_IN = {
     "mujoco": {"scene", "scene_index", "people", "touch", "physics", "task", "environment", "tasks", "benchmark"},
     "dm_control": {"scene", "physics", "task", "environment", "tasks", "rollout", "benchmark", "cli", "socialnav_mj"},
-    "matplotlib": {"report", "studies.paper", "studies.gains"},
+    "matplotlib": {"report", "studies.paper", "studies.gains", "studies.leaderboard"},
     "rerun": {"trace"},
     "torch": {"learning"},
     "stable_baselines3": {"learning"},

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 from dm_control.rl.control import PhysicsError
 
+from socialnav_mj.cli.board import Leaderboard
 from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench, StepSize
@@ -30,6 +31,7 @@ Command = (
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
     | Annotated[Gains, tyro.conf.subcommand("gains")]
+    | Annotated[Leaderboard, tyro.conf.subcommand("leaderboard")]
 )
 
 

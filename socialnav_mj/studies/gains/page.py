@@ -73,7 +73,7 @@ def _best(sweeps: Sequence[Sweep]) -> list[str]:
             [
                 sweep.recording,
                 LOOKS[sweep.form].label,
-                f"`{sweep.fields[best]}`",
+                sweep.fields[best],
                 each,
                 f"{mean[0]:.3f}",
                 f"{mean[best]:.3f}",
