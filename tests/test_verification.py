@@ -48,6 +48,25 @@ def test_episodes_and_traces_of_a_resumed_run_give_the_same_states(run: Path, n_
     assert all(v.same for v in verdicts), verdicts
 
 
+def test_episodes_and_traces_of_people_who_yield_give_the_same_states(tmp_path: Path) -> None:
+    wide = {"robot_radius": 0.3, "pedestrian_radius": 0.3, "pedestrian": "compliant"}
+    plan = Evaluation(
+        dataset=TINY, scenarios=("scenario_3",), controllers=("go_straight",), draws=1, seed=1, task_kwargs=wide
+    )
+    list(evaluate(plan, tmp_path, n_jobs=1))
+    write_report(tmp_path)
+    episode = Episode.load(tmp_path / "episodes" / EPISODE)
+    assert (episode.contact_held_back > 0.0).any()
+    verdicts = list(verify(tmp_path, dataset=TINY, n_jobs=1))
+    assert len(verdicts) > 4 and all(v.same for v in verdicts), verdicts
+    # Where the bodies were is part of what is verified.
+    position = episode.pedestrian_position.copy()
+    position[np.isfinite(position)] += 1e-9
+    replace(episode, pedestrian_position=position).save(tmp_path / "episodes" / EPISODE)
+    (told,) = verify(tmp_path / "episodes" / EPISODE, dataset=TINY, n_jobs=1)
+    assert "pedestrian_position differs" in " ".join(told.differences)
+
+
 def test_cut_episode_is_verified_over_its_own_length(run: Path) -> None:
     metadata = dict(Episode.load(run / "episodes" / "scenario_3.go_straight.draw_001.npz").metadata)
     whole = resimulate(metadata, dataset=TINY)
