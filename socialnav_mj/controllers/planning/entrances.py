@@ -54,6 +54,7 @@ class Entrances:
         order = np.argsort(np.where(near, distance, np.inf), axis=1, kind="stable")[
             :, : near.sum(axis=1).max(initial=0)
         ]
-        place, near = np.take_along_axis(place, order[..., None], axis=1), np.take_along_axis(near, order, axis=1)
+        agent = np.arange(len(place))[:, None]
+        place, near = place[agent, order], near[agent, order]
         frequency = np.where(near, self._counts[order] / (self._time + PRIOR_TIME), 0.0)
         return place[..., 0].copy(), place[..., 1].copy(), frequency

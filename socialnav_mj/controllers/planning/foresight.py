@@ -63,7 +63,7 @@ class Foresight:
         position, _, there = seen_by(observation, rows)
         columns, real = _nearest(position, there)
         velocity = self._tracks.velocities(observation, rows, columns, self._lags)
-        here = np.take_along_axis(position, columns[..., None], axis=1)[:, :, None]
+        here = position[np.arange(len(rows))[:, None], columns][:, :, None]
         person = columns < observation["pedestrian_mask"].shape[1]
         people, agents = (of(velocity, steps=self._steps) for of in (self._of_people, self._of_agents))
         moved = np.where(person[..., None, None], people, agents)
@@ -79,4 +79,4 @@ def _nearest(position: Array, there: NDArray[np.bool_]) -> tuple[NDArray[np.int6
     distance = np.where(there & (distance <= NEIGHBOUR_DISTANCE), distance, np.inf)
     k = min(MOST_NEIGHBOURS, int(np.isfinite(distance).sum(axis=1).max(initial=0)))
     columns = np.argsort(distance, axis=1, kind="stable")[:, :k]
-    return columns, np.isfinite(np.take_along_axis(distance, columns, axis=1))
+    return columns, np.isfinite(distance[np.arange(len(distance))[:, None], columns])

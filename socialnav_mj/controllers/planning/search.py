@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -43,6 +44,7 @@ class Choice:
     """(n,) the part of it that is for clearance [s]."""
 
 
+@lru_cache(maxsize=8)
 def library(max_speed: float) -> Array:
     """Plans to begin with, their headings counted from the goal's bearing.
 
@@ -50,10 +52,12 @@ def library(max_speed: float) -> Array:
         max_speed: [m/s].
 
     Returns:
-        (p, 5); the first goes straight to the goal.
+        (p, 5), not to be written to; the first goes straight to the goal.
     """
     plans = [(h, s * max_speed, t, 0.0, max_speed) for h in HEADINGS for s in SPEEDS for t in DURATIONS]
-    return np.array([*plans, *((0.0, 0.0, t, 0.0, max_speed) for t in PAUSES)])
+    result = np.array([*plans, *((0.0, 0.0, t, 0.0, max_speed) for t in PAUSES)])
+    result.flags.writeable = False
+    return result
 
 
 def search(costs: Costs, goal: Array, last: Array, *, noise: Array, max_speed: float) -> Choice:
