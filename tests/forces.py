@@ -12,7 +12,7 @@ import numpy as np
 from socialnav_mj.config import Scenario
 from socialnav_mj.contact import IMPACT_DURATION
 from socialnav_mj.geometry import quaternion_of_yaw
-from socialnav_mj.metrics.severity import ROBOT_MASS, reduced_mass
+from socialnav_mj.metrics.severity import LEG_STIFFNESS, ROBOT_MASS, reduced_mass
 from socialnav_mj.physics import Physics
 from socialnav_mj.report.markdown import table
 from socialnav_mj.scene import build_model
@@ -22,10 +22,14 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "metrics.md"
 BEGIN, END = "<!-- Made by `python tests/forces.py`. -->\n", "<!-- End of what it makes. -->"
 BEGIN_PEOPLE = "<!-- Made by `python tests/forces.py`: both kinds of people. -->\n"
 
+BEGIN_DRIVE = "<!-- Made by `python tests/forces.py`: a robot that drives. -->\n"
+
 SIDES = {"front": np.pi, "side": 0.5 * np.pi, "behind": 0.0}
 """Heading of the robot, towards which somebody walks along +x [rad]."""
 SPEEDS = (0.5, 1.0, 1.5)
 """Of the walker [m/s]."""
+WALKS = (-1.0, 0.0, 0.5, 0.8)
+"""Of somebody ahead of a robot that drives at 1 m/s, along its way [m/s]."""
 DURATION = 4.0
 """Of the walk, from 0.05 m before the touch on [s]."""
 TYRE_FRICTION, GRAVITY = 0.8, 9.81
@@ -129,6 +133,40 @@ def force_table() -> str:
     return "\n".join(table(headings, rows))
 
 
+def drive(walk: float, *, pedestrian: str = "rigid") -> Touch:
+    """Drive at 1 m/s into somebody ahead who walks along, stands, or comes.
+
+    Args:
+        walk: Velocity of the person along the robot's way [m/s].
+        pedestrian: Its kind.
+
+    Returns:
+        The first touch.
+    """
+    scenario = Scenario(pedestrian=pedestrian)
+    bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
+    physics = Physics.from_mujoco(build_model(scenario, n_agent_slots=1, n_pedestrian_slots=1, **bounds))
+    with physics.reset_context():
+        physics.place_agent(0, np.zeros(2), 0.0)
+    physics.set_twist(np.array([[1.0, 0.0]]))
+    physics.step(150)
+    start = physics.agent_position()[0, 0] + scenario.contact_distance + 0.05
+    steps, walker = 200, np.array([0])
+    path, velocity = np.zeros((steps, 1, 2)), np.zeros((steps, 1, 2))
+    path[:, 0, 0], velocity[..., 0] = start + walk * 0.01 * np.arange(steps), walk
+    physics.set_pedestrian_pose(walker, path[0], quaternion_of_yaw(np.zeros(1)), velocity[0])
+    physics.set_pedestrian_contacts(walker, np.ones(1, dtype=bool))
+    physics.set_pedestrian_path(path, velocity)
+    physics.step(steps)
+    return physics.new_touches()[0]
+
+
+def flesh_of(touch: Touch) -> float:
+    """What the closing speed of a touch along the wheels would make on flesh [N]."""
+    speed = float((touch.agent_velocity - touch.partner_velocity)[0] * touch.normal[0])
+    return speed * float(np.sqrt(reduced_mass(np.zeros(1))[0] * LEG_STIFFNESS))
+
+
 def people_table() -> str:
     """The table of the two kinds of people in docs/metrics.md."""
     headings = ["from", "walker [m/s]", "impact: impulse [N s]", "largest force [N]", "push: mean force [N]"]
@@ -146,6 +184,19 @@ def people_table() -> str:
     return "\n".join(table(headings, rows))
 
 
+def drive_table() -> str:
+    """The table of a robot that drives in docs/metrics.md."""
+    headings = ["person ahead, velocity [m/s]", "two bodies [N s]", "impact: impulse [N s]", "largest force [N]"]
+    rows = []
+    for walk in WALKS:
+        rigid, compliant = drive(walk), drive(walk, pedestrian="compliant")
+        momentum = flesh_of(rigid) * float(np.sqrt(reduced_mass(np.zeros(1))[0] / LEG_STIFFNESS))
+        impulse, force = ([getattr(t, name) for t in (rigid, compliant)] for name in ("impact_impulse", "impact_force"))
+        told = [f"{impulse[0]:.1f} / {impulse[1]:.1f}", f"{force[0]:.0f} / {force[1]:.0f}", f"{flesh_of(rigid):.0f}"]
+        rows.append([f"{walk:.1f}", f"{momentum:.1f}", *told])
+    return "\n".join(table([*headings, "flesh [N]"], rows))
+
+
 def _of_kind(case: Case) -> list[str]:
     touch = case.touch
     mean = touch.push_impulse / touch.push_duration
@@ -154,7 +205,7 @@ def _of_kind(case: Case) -> list[str]:
 
 def with_table(page: str) -> str:
     """The page with the table of today between its marks."""
-    for begin, content in ((BEGIN, force_table()), (BEGIN_PEOPLE, people_table())):
+    for begin, content in ((BEGIN, force_table()), (BEGIN_PEOPLE, people_table()), (BEGIN_DRIVE, drive_table())):
         before, _, rest = page.partition(begin)
         page = f"{before}{begin}\n{content}\n{END}{rest.partition(END)[2]}"
     return page
@@ -162,4 +213,4 @@ def with_table(page: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    sys.stdout.write(f"{force_table()}\n{people_table()}")
+    sys.stdout.write(f"{force_table()}\n{people_table()}\n{drive_table()}")

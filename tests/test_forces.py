@@ -1,7 +1,7 @@
 """Forces of a walker who goes into a standing robot, beside the momentum that two bodies exchange."""
 
 import pytest
-from forces import PAGE, SIDES, SPEEDS, Case, cases, run, with_table
+from forces import PAGE, SIDES, SPEEDS, WALKS, Case, cases, drive, flesh_of, run, with_table
 
 from socialnav_mj.contact import IMPACT_DURATION
 from socialnav_mj.people import PUSHING_FORCE
@@ -45,6 +45,16 @@ def test_walker_who_yields_gives_the_momentum_of_two_bodies_and_is_held_back() -
         assert 0.7 * rigid.moved < case.moved < rigid.moved
         assert case.touch.push_impulse / case.touch.push_duration < PUSHING_FORCE
         assert rigid.touch.held_back == 0.0 and 0.2 < case.touch.held_back < 0.5
+
+
+def test_force_of_a_robot_that_drives_follows_the_closing_speed_only_where_people_yield() -> None:
+    """To the solver a mocap body stands, so who walks ahead of the robot is struck as if it stood."""
+    rigid = [drive(walk) for walk in WALKS]
+    forces = [touch.impact_force for touch in rigid]
+    assert max(forces) < 1.15 * min(forces) and forces[-1] > 2.0 * flesh_of(rigid[-1])
+    for walk in WALKS:
+        touch = drive(walk, pedestrian="compliant")
+        assert touch.impact_force == pytest.approx(0.55 * flesh_of(touch), rel=0.05)
 
 
 def test_page_shows_the_table_of_today() -> None:
