@@ -273,10 +273,10 @@ def interrupted(folder, jobs, number=signal.SIGINT, *, all_of_them=True):
     ("jobs", "number", "all_of_them"),
     [
         ("1", signal.SIGINT, True),
-        ("2", signal.SIGINT, True),
-        ("1", signal.SIGTERM, False),
+        pytest.param("2", signal.SIGINT, True, marks=pytest.mark.slow),
+        pytest.param("1", signal.SIGTERM, False, marks=pytest.mark.slow),
         ("2", signal.SIGTERM, False),
-        ("2", signal.SIGTERM, True),
+        pytest.param("2", signal.SIGTERM, True, marks=pytest.mark.slow),
         ("2", signal.SIGHUP, True),
     ],
 )

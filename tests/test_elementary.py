@@ -38,7 +38,7 @@ from socialnav_mj.rollout import rollout
 
 found = {}
 for spec in ("potential_field", "replay_irl", "hybrid", "mpc"):
-    environment = make_environment(dataset="plaza", share=0.3, time_limit=12.0)
+    environment = make_environment(dataset="plaza", share=0.3, time_limit=5.0)
     found[spec] = rollout(environment, make_controller(spec)).metadata["state_hash"]
 if os.environ.get("SOCIALNAV_MJ_DATA"):  # the recordings whose homography turns
     positions = np.concatenate(load_recording("zara01").positions)
@@ -48,12 +48,11 @@ print(json.dumps(found))
 
 
 def test_states_do_not_depend_on_the_kernels_that_numpy_and_blas_choose():
-    """BLAS as on three generations of processors, numpy and numba without the vector kernels that this one has."""
+    """BLAS as on older processors, numpy and numba without the vector kernels that this one has."""
     vectors = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     settings = [
         {},
         {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": " ".join(vectors), "NUMBA_CPU_NAME": "generic"},
-        {"OPENBLAS_CORETYPE": "Prescott"},
         {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": " ".join(vectors)},
     ]
     found = []

@@ -72,7 +72,7 @@ def test_files_that_may_not_grow_are_told_and_the_next_run_goes_on(tmp_path: Pat
     assert failed.stderr.count("File too large") == 2
     assert "2 of 2 episodes failed" in re.sub(r"\s+", " ", failed.stderr)
     assert files_of(out) == {"run.json"}
-    done = typed(*WANTED, "--out", str(out), jobs=2)
+    done = typed(*WANTED, "--out", str(out))
     assert done.returncode == 0 and "2/2" in done.stderr
     assert not [name for name in files_of(out) if ".part" in name]
 

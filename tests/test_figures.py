@@ -70,12 +70,20 @@ def test_intervals_of_shares_end_at_0_and_1(table):
             assert 0.0 <= row.interval.low <= row.interval.high <= 1.0
 
 
-def test_five_figures_appear_as_png_and_svg_with_their_labels(table, tmp_path):
-    paths = draw_figures(table, tmp_path)
+@pytest.fixture(scope="module")
+def drawn(table, tmp_path_factory):
+    """All figures, drawn coarsely."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(style, "DOTS_PER_INCH", 40)
+        return draw_figures(table, tmp_path_factory.mktemp("drawn"))
+
+
+def test_five_figures_appear_as_png_and_svg_with_their_labels(drawn):
+    paths, folder = drawn, drawn[0].parent
     assert sorted(p.name for p in paths) == sorted(f"{d.name}.{e}" for d in FIGURES for e in ("png", "svg"))
     for drawing in FIGURES:
-        assert (tmp_path / f"{drawing.name}.png").read_bytes().startswith(b"\x89PNG")
-        text = texts(tmp_path / f"{drawing.name}.svg")
+        assert (folder / f"{drawing.name}.png").read_bytes().startswith(b"\x89PNG")
+        text = texts(folder / f"{drawing.name}.svg")
         for method in METHODS:
             assert LOOKS[method].label in text
         for row in drawing.rows:
@@ -83,7 +91,7 @@ def test_five_figures_appear_as_png_and_svg_with_their_labels(table, tmp_path):
         if drawing.bars:
             assert all(f"({'abcd'[k]}) scenario {k + 1}" in text for k in range(4))
             assert "each training" in text
-    assert "1.2 m" in texts(tmp_path / "figure_4_intrusions.svg")
+    assert "1.2 m" in texts(folder / "figure_4_intrusions.svg")
 
 
 def test_every_panel_is_tall_enough_for_its_values(table, tmp_path, monkeypatch):
@@ -106,9 +114,8 @@ def test_every_panel_is_tall_enough_for_its_values(table, tmp_path, monkeypatch)
         assert bottom <= axes.dataLim.y0 + 1e-9 and axes.dataLim.y1 <= top + 1e-9
 
 
-def test_equal_levels_give_equal_files(table, tmp_path):
-    first, second = draw_figures(table, tmp_path / "a"), draw_figures(table, tmp_path / "b")
-    for one, other in zip(first, second, strict=True):
+def test_equal_levels_give_equal_files(table, drawn, tmp_path):
+    for one, other in zip(drawn, draw_figures(table, tmp_path), strict=True):
         assert one.read_bytes() == other.read_bytes(), one.name
 
 

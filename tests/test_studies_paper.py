@@ -19,6 +19,7 @@ from socialnav_mj.report.agents import Results
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.files import publish
+from socialnav_mj.studies.paper import outputs, plan
 from socialnav_mj.studies.paper.outputs import PUBLIC, agents_of, write_outputs
 from socialnav_mj.studies.paper.plan import DEFAULT, SWEEP, VARIANTS, Experiment, shipped_for
 from socialnav_mj.studies.study import read_runs, reproduce, run_folder
@@ -144,14 +145,15 @@ def test_experiment_refuses_no_policy_two_of_a_seed_and_unknown_recordings(polic
 
 
 def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsys):
+    """One training: of more there are as many more episodes."""
     out, public = tmp_path / "out", tmp_path / "results"
-    command = ["reproduce", "--dataset", TINY, "--policies", *policies, "--scenarios", "1", "4", "--draws", "1"]
+    command = ["reproduce", "--dataset", TINY, "--policies", policies[0], "--scenarios", "1", "4", "--draws", "1"]
     command += ["--seed", "0"]
     command += ["--jobs", "1", "--out", str(out), "--publish", str(public)]
     main(command)
     assert "claims:" in capsys.readouterr().out.replace("\n", " ")
     episodes = sorted((out / "runs" / "default" / "episodes").glob("*.npz"))
-    assert len(episodes) == 2 * 7
+    assert len(episodes) == 2 * 5
     before = {path: path.stat().st_mtime_ns for path in episodes}
     tables = {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
     episodes[3].unlink()
@@ -177,21 +179,24 @@ def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsy
     )
     assert heading.endswith("| same agents |")
     found = re.findall(r"\| (\d+) of (\d+)(?: \(\d+ %\))? \|$", page, flags=re.MULTILINE)
-    assert len(found) == 2 * 4 and all(int(count) <= int(total) for count, total in found)
+    assert len(found) == 2 * 5 and all(int(count) <= int(total) for count, total in found)
     linked = [part.split(")")[0] for part in page.split("](")[1:]]
     assert len(linked) >= 7 and all((public / name).is_file() for name in linked)
 
 
-def test_variants_and_sweep_are_run_and_judged(whole, tmp_path):
-    experiment = replace(whole, scenarios=("scenario_4",), draws=1)
+def test_variants_and_sweep_are_run_and_judged(whole, of_both_limits, tmp_path, monkeypatch):
+    swept = (SWEEP[0], SWEEP[-1])
+    for module in (plan, outputs):
+        monkeypatch.setattr(module, "SWEEP", swept)
+    experiment = replace(whole, policies=of_both_limits[1:], scenarios=("scenario_4",), draws=1)
     done = list(reproduce(experiment, tmp_path, command="made so", n_jobs=1))
     assert len(done) == len(experiment.jobs()) and all(d.error is None for d in done)
     page = write_outputs(experiment, tmp_path, command="made so", n_jobs=1)
     claims = list(csv.DictReader((tmp_path / "tables" / "claims.csv").open()))
     assert {row["variant"] for row in claims} == {variant.name for variant in VARIANTS}
-    swept = list(csv.DictReader((tmp_path / "tables" / "switch_distance.csv").open()))
-    assert {float(row["switch_distance"]) for row in swept} == {*SWEEP, 2.0}
-    assert {row["method"] for row in swept} == {"mixed"}
+    rows = list(csv.DictReader((tmp_path / "tables" / "switch_distance.csv").open()))
+    assert {float(row["switch_distance"]) for row in rows} == {*swept, 2.0}
+    assert {row["method"] for row in rows} == {"mixed"}
     assert (tmp_path / "figures" / "figure_6_switch_distance.svg").is_file()
     assert "## Switch distance" in page.read_text()
     assert "turn limit per second" in (tmp_path / "figures" / "figure_8_variants.svg").read_text()
@@ -204,11 +209,11 @@ def test_variants_and_sweep_are_run_and_judged(whole, tmp_path):
 
 
 def test_fewer_draws_than_the_folder_holds_are_read_alone(experiment, tmp_path):
-    experiment = replace(experiment, scenarios=("scenario_4",))
+    experiment = replace(experiment, policies=experiment.policies[:1], scenarios=("scenario_4",))
     list(reproduce(experiment, tmp_path, n_jobs=1))
     for draws in (2, 1):
         results = read_runs(replace(experiment, draws=draws), tmp_path, n_jobs=1)["default"]
-        assert len(results.sources) == 7 * draws and {s.draw for s in results.sources} == {*range(draws)}
+        assert len(results.sources) == 5 * draws and {s.draw for s in results.sources} == {*range(draws)}
 
 
 def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(experiment, of_both_limits, tmp_path):

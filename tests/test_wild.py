@@ -14,7 +14,7 @@ from socialnav_mj.environment import Environment
 wild_run = cache(run_wild)
 
 
-@pytest.mark.parametrize("seed", [0, 5, 7, 9])
+@pytest.mark.parametrize("seed", [0, 67, 82, 168])
 def test_wild_episode_breaks_no_rule(seed: int) -> None:
     run = wild_run(seed)
     assert run.broken == []
@@ -32,7 +32,7 @@ def test_hundred_wild_episodes_break_no_rule() -> None:
 
 
 def test_broken_rules_are_told() -> None:
-    run, other = wild_run(7), wild_run(9)
+    run, other = wild_run(168), wild_run(82)
     assert len(run.episode.contact_time)
     assert broken_rules(run, run.episode) == []
     assert broken_rules(run, other.episode) == ["a second run has another state hash"]
@@ -45,7 +45,7 @@ def test_broken_rules_are_told() -> None:
     endless = replace(run, episode=replace(run.episode, contact_impact_impulse=forces))
     assert broken_rules(endless, run.episode) == ["a contact force is not finite and >= 0"]
     told = summary([run, replace(other, broken=["it fell apart"])])
-    assert "1 episodes broke a rule" in told and "seed 9" in told.splitlines()[-1] and "it fell apart" in told
+    assert "1 episodes broke a rule" in told and "seed 82" in told.splitlines()[-1] and "it fell apart" in told
 
 
 @pytest.mark.parametrize("solid", [True, False])

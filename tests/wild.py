@@ -213,12 +213,16 @@ class WatchedPhysics(Physics):
 
     def _bumper_velocity(self) -> Array:
         """Of the bumpers' centres, which is where bodies push; the floor below swings under a robot that rocks."""
-        velocity = self.data.qvel[self._index.qvel[:, None] + np.arange(6)]
-        lever = BUMPER_HEIGHT * np.stack([velocity[:, 4], -velocity[:, 3]], axis=-1)
-        real, *imaginary = self._agent_quaternion().T
-        axis, swing = np.stack(imaginary, axis=-1), np.pad(lever, ((0, 0), (0, 1)))
-        once = np.cross(axis, swing)
-        return (velocity[:, :3] + swing + 2.0 * (real[:, None] * once + np.cross(axis, once)))[:, :2]
+        vx, vy, _, turn_x, turn_y, _ = self.data.qvel[self._index.qvel[:, None] + np.arange(6)].T
+        w, x, y, z = self._agent_quaternion().T
+        ahead, left = BUMPER_HEIGHT * turn_y, -BUMPER_HEIGHT * turn_x  # turns are about the robot's own axes
+        return np.stack(
+            [
+                vx + (1.0 - 2.0 * (y * y + z * z)) * ahead + 2.0 * (x * y - w * z) * left,
+                vy + 2.0 * (x * y + w * z) * ahead + (1.0 - 2.0 * (x * x + z * z)) * left,
+            ],
+            axis=-1,
+        )
 
     def _touched(self, robots: Array) -> Array:
         """Count bodies that went through a robot: began to overlap on one side, came near its centre, ended beyond.
