@@ -21,11 +21,11 @@ COMMAND = (sys.executable, "-c", "from socialnav_mj.cli import main; main()")
 WANTED = ("evaluate", "--dataset", str(TINY), "--scenarios", "1", "--draws", "1", "--controllers", "go_straight")
 
 
-def typed(*args: str, jobs: int = 1, bytes_a_file: int | None = None) -> "subprocess.CompletedProcess[str]":
+def typed(*args: str, bytes_a_file: int | None = None) -> "subprocess.CompletedProcess[str]":
     """A command in a process that may write files of a certain size at most."""
     limit = None if bytes_a_file is None else partial(resource.setrlimit, resource.RLIMIT_FSIZE, (bytes_a_file,) * 2)
     return subprocess.run(
-        [*COMMAND, *args, "--jobs", str(jobs)], capture_output=True, text=True, check=False, preexec_fn=limit
+        [*COMMAND, *args, "--jobs", "1"], capture_output=True, text=True, check=False, preexec_fn=limit
     )
 
 
@@ -67,7 +67,7 @@ def locked_folder(tmp_path: Path) -> Iterator[Path]:
 def test_files_that_may_not_grow_are_told_and_the_next_run_goes_on(tmp_path: Path) -> None:
     """Room for run.json, and none for an episode."""
     out = tmp_path / "out"
-    failed = typed(*WANTED, "--out", str(out), jobs=2, bytes_a_file=4096)
+    failed = typed(*WANTED, "--out", str(out), bytes_a_file=4096)
     assert failed.returncode == 2 and "Traceback" not in failed.stderr and failed.stdout == ""
     assert failed.stderr.count("File too large") == 2
     assert "2 of 2 episodes failed" in re.sub(r"\s+", " ", failed.stderr)
