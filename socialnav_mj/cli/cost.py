@@ -16,7 +16,7 @@ from socialnav_mj.cli.console import console, errors, follow, say
 
 @dataclass(frozen=True, kw_only=True)
 class StepSize:
-    """Run the same agents at several physics steps, and among people a micrometre wider: what changes?
+    """Run the same agents at several physics steps: what changes?
 
     If it is interrupted, repeat the command to resume it.
     """
@@ -27,13 +27,13 @@ class StepSize:
     """Where recordings are looked for first."""
     scenarios: Scenarios = (1,)
     """Scenarios to run."""
-    controllers: tuple[str, ...] = ("potential_field", "replay_irl")
+    controllers: tuple[str, ...] = ("potential_field_capped", "replay_irl")
     """As in `evaluate`."""
     draws: int = 10
     """Random choices of the replaced people."""
     seed: int = 0
     """Number of the first draw; the others count up from it."""
-    steps: tuple[float, ...] = (0.01, 0.005, 0.0025)
+    steps: tuple[float, ...] = (0.01, 0.2 / 21, 0.005, 0.0025)
     """Physics steps, the one to compare with first [s]."""
     jobs: int = -1
     """Processes; -1 for one a core."""
