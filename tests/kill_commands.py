@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -86,31 +85,20 @@ def _prepare_reproduce(folder: Path) -> None:
 
 def _train() -> None:
     from socialnav_mj.config import Scenario
-    from socialnav_mj.learning import config as module
 
-    small = {
-        "train_window": (0.0, 1.0),
-        "validation_window": (0.0, 1.0),
-        "test_window": (0.0, 1.0),
-        "shares": (0.4, 1.0),
-        "n_slots": 3,
-        "hidden": (16,),
-        "batch_size": 32,
-        "updates_per_scene_step": 1,
-        "guided_scene_steps": 20,
-        "buffer_size": 200,
-        "checkpoint_every": 40,
-        "validation_shares": (0.7,),
-    }
-    whole = module.TrainingConfig
-
-    def made(**given: Any) -> Any:
-        return whole(**{**given, **small})
-
-    made.scene_steps = 120  # type: ignore[attr-defined]
     Scenario.allowed_steps = lambda self, distance: 30  # type: ignore[method-assign]  # short validations
-    module.TrainingConfig = made
-    _typed("train", "replay-irl", "--dataset", str(TINY), "--out", "out")
+    small = (
+        "--train-window 0 1 --validation-window 0 1 --test-window 0 1 --shares 0.4 1 --n-slots 3 --hidden 16 "
+        "--batch-size 32 --updates-per-scene-step 1 --guided-scene-steps 20 --buffer-size 200 --checkpoint-every 40 "
+        "--validation-shares 0.7 --scene-steps 120"
+    )
+    _typed("train", "replay-irl", "--dataset", str(TINY), "--out", "out", *small.split())
+
+
+def _leaderboard() -> None:
+    _draw_coarsely()
+    wanted = f"--recordings {TINY} --scenarios 4 --controllers go_straight social_force --draws 1 --jobs 1 --out out"
+    _typed("leaderboard", *wanted.split())
 
 
 def _fetch() -> None:
@@ -128,6 +116,7 @@ COMMANDS = {
     "report": Command(run=_report, prepare=_prepare_report),
     "train": Command(run=_train, imports=("socialnav_mj.cli", "socialnav_mj.learning.training", "torch._dynamo")),
     "reproduce": Command(run=_reproduce, prepare=_prepare_reproduce),
+    "leaderboard": Command(run=_leaderboard),
     "fetch": Command(run=_fetch),
 }
 
