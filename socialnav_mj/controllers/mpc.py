@@ -20,9 +20,9 @@ Preset = Literal["social", "free", "calm"]
 
 WEIGHTS = ("person", "agent", "zone", "entrance")
 PRESETS: dict[str, tuple[float, float, float, float]] = {
-    "social": (6.0, 4.0, 0.35, 25.0),
-    "free": (6.0, 4.0, 0.0, 25.0),
-    "calm": (8.0, 4.0, 1.0, 25.0),
+    "social": (6.0, 6.0, 0.35, 25.0),
+    "free": (6.0, 6.0, 0.0, 25.0),
+    "calm": (8.0, 6.0, 1.0, 25.0),
 }
 """Weights of `WEIGHTS` in each preset; chosen on draws 0-9 of students003."""
 STEPS = 16
