@@ -19,11 +19,11 @@ class Look:
     """As matplotlib's linestyle."""
 
 
-# P. Tol's "high-contrast" scheme: distinct for every kind of colour vision, and light, middle, dark in greyscale. The
-# capped field has a lighter shade of the paper's.
+# P. Tol's "high-contrast" scheme: distinct for every kind of colour vision, and light, middle, dark in greyscale; the
+# capped field lies between two of them.
 LOOKS: dict[str, Look] = {
     POTENTIAL_FIELD: Look(label="potential field", colour="#DDAA33", hatch="", marker="o", line="-"),
-    CAPPED: Look(label="capped field", colour="#EECC66", hatch="\\\\\\\\", marker="v", line=(0, (5, 1, 1, 1, 1, 1))),
+    CAPPED: Look(label="capped field", colour="#55AAAA", hatch="\\\\\\\\", marker="v", line=(0, (5, 1, 1, 1, 1, 1))),
     REPLAY_IRL: Look(label="ReplayIRL", colour="#004488", hatch="////", marker="s", line="--"),
     MIXED: Look(label="hybrid", colour="#BB5566", hatch="....", marker="D", line="-."),
     HUMAN: Look(label="human", colour="#000000", hatch="", marker="^", line=":"),
