@@ -31,7 +31,7 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
     with style():
         figure = new_figure(1.6 + 2.1 * len(_AXES))
         grid = figure.subplots(len(_AXES), len(scenarios), sharex="row", sharey="col", squeeze=False)
-        for (measure, label), row in zip(_AXES, grid, strict=True):
+        for number, ((measure, label), row) in enumerate(zip(_AXES, grid, strict=True)):
             for place, (scenario, axes) in enumerate(zip(scenarios, row, strict=True)):
                 for k, name in enumerate(board.controllers):
                     axes.errorbar(
@@ -58,14 +58,14 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
                 human = board.table.find(scenario, HUMAN, "success")
                 if human is not None:
                     axes.axhline(human.interval.mean, color="black", linewidth=0.8, linestyle=":")
-                if row is grid[0]:
+                if number == 0:
                     axes.set_title(
                         f"{board.recording}, {short_title(scenario, place)}"
                         if place == 0
                         else short_title(scenario, place)
                     )
                 axes.grid(visible=True, axis="both")
-                axes.set_xlabel(label)
+            row[0].set_xlabel(label, loc="left")
             row[0].set_ylabel("share of agents that succeed")
         handles, labels = grid[0][0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=4)
