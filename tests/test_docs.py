@@ -145,6 +145,9 @@ def test_options_in_the_text_are_those_of_a_command(capsys):
     ] + [
         ["leave-one-out"],
         ["step-size"],
+        ["gains"],
+        ["leaderboard"],
+        ["fit-prediction"],
         ["data", "list"],
         ["data", "info"],
         ["data", "fetch"],
