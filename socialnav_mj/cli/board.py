@@ -1,12 +1,10 @@
 """The sub-command `leaderboard`."""
 
-import shlex
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
-from socialnav_mj.cli.console import errors, follow, say
+from socialnav_mj.cli.study import run_study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +38,7 @@ class Leaderboard:
 
     def run(self) -> None:
         """Run what is missing behind a bar, then write tables, figure and page, and copy them if asked to."""
-        from socialnav_mj.studies.files import publish
         from socialnav_mj.studies.leaderboard import study as leaderboard
-        from socialnav_mj.studies.study import reproduce
 
         study = leaderboard.Leaderboard(
             recordings=self.recordings,
@@ -52,10 +48,13 @@ class Leaderboard:
             draws=self.draws,
             seed=self.seed,
         )
-        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
-        follow(reproduce(study, self.out, command=command, n_jobs=self.jobs), study.jobs())
-        with errors.status("tables and figure"):
-            page = leaderboard.write_leaderboard(study, self.out, command=command, n_jobs=self.jobs)
-        say(f"leaderboard: {page}")
-        if self.publish is not None:
-            say(f"to be committed: {publish(self.out, self.publish, leaderboard.PUBLIC)}")
+        run_study(
+            study,
+            leaderboard.write_leaderboard,
+            leaderboard.PUBLIC,
+            out=self.out,
+            jobs=self.jobs,
+            publish_to=self.publish,
+            making="tables and figure",
+            label="leaderboard",
+        )

@@ -1,16 +1,15 @@
 """The sub-commands of learning and of many runs: `train`, `ship`, `fit-prediction`, `reproduce`, `leave-one-out`."""
 
-import shlex
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
-from socialnav_mj.cli.console import counted_progress, errors, follow, say
+from socialnav_mj.cli.console import counted_progress, say
 from socialnav_mj.cli.settings import TrainingSettings
+from socialnav_mj.cli.study import run_study
 from socialnav_mj.learning.config import TrainingConfig
 
 
@@ -141,10 +140,8 @@ class Reproduce:
 
     def run(self) -> None:
         """Run what is missing behind a bar, then write figures, tables and pages, and copy them if asked to."""
-        from socialnav_mj.studies.files import publish
         from socialnav_mj.studies.paper.outputs import PUBLIC, write_outputs
         from socialnav_mj.studies.paper.plan import Experiment, shipped_for
-        from socialnav_mj.studies.study import reproduce
 
         experiment = Experiment(
             dataset=self.dataset,
@@ -157,13 +154,9 @@ class Reproduce:
             variant_draws=self.variant_draws,
             variant_trainings=self.variant_trainings,
         )
-        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
-        follow(reproduce(experiment, self.out, command=command, n_jobs=self.jobs), experiment.jobs())
-        with errors.status("tables and figures"):
-            page = write_outputs(experiment, self.out, command=command, n_jobs=self.jobs)
-        say(f"report: {page}\nclaims: {self.out / 'claims.md'}")
-        if self.publish is not None:
-            say(f"to be committed: {publish(self.out, self.publish, PUBLIC)}")
+        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
+        claims = f"\nclaims: {self.out / 'claims.md'}"
+        run_study(experiment, write_outputs, PUBLIC, making="tables and figures", also=claims, **folders)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,9 +190,7 @@ class LeaveOneOut:
 
     def run(self) -> None:
         """Run what is missing behind a bar, then write tables and the page, and copy them if asked to."""
-        from socialnav_mj.studies.files import publish
         from socialnav_mj.studies.leave_one_out import study as leave_one_out
-        from socialnav_mj.studies.study import reproduce
 
         study = leave_one_out.LeaveOneOut(
             recordings=self.recordings,
@@ -209,13 +200,8 @@ class LeaveOneOut:
             draws=self.draws,
             seed=self.seed,
         )
-        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
-        follow(reproduce(study, self.out, command=command, n_jobs=self.jobs), study.jobs())
-        with errors.status("tables"):
-            page = leave_one_out.write_leave_one_out(study, self.out, command=command, n_jobs=self.jobs)
-        say(f"report: {page}")
-        if self.publish is not None:
-            say(f"to be committed: {publish(self.out, self.publish, leave_one_out.PUBLIC)}")
+        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
+        run_study(study, leave_one_out.write_leave_one_out, leave_one_out.PUBLIC, making="tables", **folders)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,24 +235,17 @@ class Gains:
 
     def run(self) -> None:
         """Run what is missing behind a bar, then write tables, figure and page, and copy them if asked to."""
-        from socialnav_mj.studies.files import publish
         from socialnav_mj.studies.gains.study import PUBLIC, GainSweep, write_gain_sweep
         from socialnav_mj.studies.paper.plan import shipped_for
-        from socialnav_mj.studies.study import reproduce
 
         study = GainSweep(
             recordings=self.recordings,
-            policies=self.policies or shipped_for("students003")[:3],
+            policies=self.policies or shipped_for("students003", turn_limit="per_step")[:3],
             settings=self.settings,
             data_dir=None if self.data_dir is None else str(self.data_dir),
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             draws=self.draws,
             seed=self.seed,
         )
-        command = shlex.join(["socialnav-mj", *sys.argv[1:]])
-        follow(reproduce(study, self.out, command=command, n_jobs=self.jobs), study.jobs())
-        with errors.status("tables and figure"):
-            page = write_gain_sweep(study, self.out, command=command, n_jobs=self.jobs)
-        say(f"report: {page}")
-        if self.publish is not None:
-            say(f"to be committed: {publish(self.out, self.publish, PUBLIC)}")
+        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
+        run_study(study, write_gain_sweep, PUBLIC, making="tables and figure", **folders)

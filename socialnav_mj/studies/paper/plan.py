@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import Scenario, TurnLimit
 from socialnav_mj.controllers.hybrid import Who
 from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
@@ -206,12 +206,13 @@ def _mixed(variant: Variant, trained: Mapping[int, str], distance: float) -> tup
     )
 
 
-def shipped_for(dataset: str, features: str = "continuous") -> tuple[str, ...]:
+def shipped_for(dataset: str, features: str = "continuous", *, turn_limit: TurnLimit | None = None) -> tuple[str, ...]:
     """Shipped policies that were trained on a recording.
 
     Args:
         dataset: Name of the recording.
         features: Name of the feature set.
+        turn_limit: Only those that were trained for it; None for all.
 
     Returns:
         Names, one for each turn limit and training seed.
@@ -220,7 +221,11 @@ def shipped_for(dataset: str, features: str = "continuous") -> tuple[str, ...]:
         ValueError: If there is none.
     """
     pattern = re.compile(rf"{re.escape(dataset)}_{re.escape(features)}(_per_second)?_seed\d+")
-    found = tuple(name for name in shipped_policies() if pattern.fullmatch(name))
+    found = tuple(
+        name
+        for name in shipped_policies()
+        if pattern.fullmatch(name) and turn_limit in (None, load_policy(name).turn_limit)
+    )
     if not found:
         raise ValueError(
             f"no shipped policy was trained on {dataset!r} with {features!r} features; available: "
