@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from socialnav_mj.controllers.replay_irl import load_policy
-from socialnav_mj.files import csv_bytes, write_whole
+from socialnav_mj.files import csv_bytes, write_json, write_whole
+from socialnav_mj.provenance import recording_metadata
+from socialnav_mj.recordings import Recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.studies.levels import Level
 from socialnav_mj.studies.study import Study
@@ -36,6 +38,27 @@ def provenance_of(study: Study, results: Mapping[str, Results], *, command: str)
         },
         "runs": {name: _run_facts(result) for name, result in results.items()},
     }
+
+
+def write_provenance(
+    study: Study, results: Mapping[str, Results], recordings: Iterable[Recording], out: Path, *, command: str
+) -> dict[str, Any]:
+    """Write provenance.json of a study on several recordings.
+
+    Args:
+        study: That was run.
+        results: Of each run.
+        recordings: That it ran on.
+        out: Folder of the study.
+        command: That made it.
+
+    Returns:
+        As `provenance_of`, and the recordings.
+    """
+    provenance = provenance_of(study, results, command=command)
+    provenance["recordings"] = [recording_metadata(recording) for recording in recordings]
+    write_json(out / "provenance.json", provenance)
+    return provenance
 
 
 def _run_facts(results: Results) -> dict[str, Any]:

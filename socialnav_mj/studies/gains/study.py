@@ -10,12 +10,11 @@ from scipy.stats import qmc
 
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_json, write_whole
-from socialnav_mj.provenance import recording_metadata
+from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
-from socialnav_mj.studies.files import provenance_of, write_csv
+from socialnav_mj.studies.files import write_csv, write_provenance
 from socialnav_mj.studies.gains.figure import draw_gains
 from socialnav_mj.studies.gains.page import gains_page
 from socialnav_mj.studies.gains.ranges import Sweep, sweep_of
@@ -143,10 +142,8 @@ def write_gain_sweep(study: GainSweep, out: Path, *, command: str, n_jobs: int =
     write_csv(out / "tables" / "gains.csv", [row for sweep in sweeps for row in sweep.rows()])
     write_csv(out / "tables" / "claims.csv", [row for sweep in sweeps for row in sweep.claim_rows()])
     draw_gains(sweeps, out / "figures")
-    provenance = provenance_of(study, results, command=command)
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
-    provenance["recordings"] = [recording_metadata(recording) for recording in recordings]
-    write_json(out / "provenance.json", provenance)
+    provenance = write_provenance(study, results, recordings, out, command=command)
     return write_whole(out / "README.md", gains_page(sweeps, ranges=RANGES, provenance=provenance).encode())
 
 

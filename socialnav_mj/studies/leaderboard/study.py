@@ -7,12 +7,11 @@ from pathlib import Path
 from socialnav_mj.controllers import BUILT_IN
 from socialnav_mj.controllers.specs import with_policy_of
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_json, write_whole
-from socialnav_mj.provenance import recording_metadata
+from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
-from socialnav_mj.studies.files import provenance_of, write_csv
+from socialnav_mj.studies.files import write_csv, write_provenance
 from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
 from socialnav_mj.studies.leaderboard.figure import draw_fronts
@@ -97,10 +96,8 @@ def write_leaderboard(study: Leaderboard, out: Path, *, command: str, n_jobs: in
     write_csv(out / "tables" / "leaderboard.csv", [row for board in boards for row in board.rows()])
     write_csv(out / "tables" / "pairs.csv", [row for board in boards for row in board.pair_rows()])
     draw_fronts(boards, out / "figures")
-    provenance = provenance_of(study, results, command=command)
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
-    provenance["recordings"] = [recording_metadata(recording) for recording in recordings]
-    write_json(out / "provenance.json", provenance)
+    provenance = write_provenance(study, results, recordings, out, command=command)
     return write_whole(out / "README.md", leaderboard_page(boards, provenance=provenance).encode())
 
 

@@ -6,12 +6,11 @@ from pathlib import Path
 
 from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_json, write_whole
-from socialnav_mj.provenance import recording_metadata
+from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
-from socialnav_mj.studies.files import level_rows, provenance_of, write_csv
+from socialnav_mj.studies.files import level_rows, write_csv, write_provenance
 from socialnav_mj.studies.held_out import IN_SAMPLE, learned_from, period_of_people, recording_name
 from socialnav_mj.studies.leave_one_out.comparison import SideBySide, learned_method, side_by_side
 from socialnav_mj.studies.leave_one_out.page import leave_one_out_page
@@ -166,9 +165,7 @@ def write_leave_one_out(study: LeaveOneOut, out: Path, *, command: str, n_jobs: 
             rows += level_rows(own, recording=side.recording, role=side.role(method))
         rows += level_rows(side.differences, recording=side.recording, role="difference")
     write_csv(out / "tables" / "leave_one_out.csv", rows)
-    provenance = provenance_of(study, results, command=command)
-    provenance["recordings"] = [recording_metadata(recording) for recording in recordings]
-    write_json(out / "provenance.json", provenance)
+    provenance = write_provenance(study, results, recordings, out, command=command)
     return write_whole(out / "README.md", leave_one_out_page(compared, provenance=provenance).encode())
 
 
