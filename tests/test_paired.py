@@ -14,11 +14,11 @@ from scipy.stats import t as student
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Outcome, Partner
 from socialnav_mj.report import power, writer
-from socialnav_mj.report.agents import read_results
 from socialnav_mj.report.collisions import CONTACT_SCHEMA
 from socialnav_mj.report.paired import DIFFERENCES, paired_differences
 from socialnav_mj.report.paired_figure import draw_paired
 from socialnav_mj.report.power import minimum_draws, resolutions, told
+from socialnav_mj.report.results import read_results
 from socialnav_mj.report.sections import draws_section
 
 HUMAN_STEPS = 20

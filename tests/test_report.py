@@ -21,10 +21,11 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode, EpisodeError, Outcome
 from socialnav_mj.metrics.dialects import compute
 from socialnav_mj.report import writer
-from socialnav_mj.report.agents import SCHEMA, agents_table, read_results
+from socialnav_mj.report.agents import SCHEMA, agents_table
 from socialnav_mj.report.estimates import MEASURES, draw_means, estimate, summarise
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.page import with_error
+from socialnav_mj.report.results import read_results
 
 LABELS = {"dataset": "d", "variant": "v", "scenario": "s", "controller": "c", "measure": "m"}
 CONTROLLERS = ("zigzag", "human", "potential_field")

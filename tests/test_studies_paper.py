@@ -15,8 +15,8 @@ from socialnav_mj.cli import main
 from socialnav_mj.controllers import make_controller
 from socialnav_mj.episode import EpisodeError
 from socialnav_mj.report import style
-from socialnav_mj.report.agents import Results
 from socialnav_mj.report.intervals import ONE_RECORDING
+from socialnav_mj.report.results import Results
 from socialnav_mj.studies.claims import CLAIMS
 from socialnav_mj.studies.files import publish
 from socialnav_mj.studies.paper import outputs, plan

@@ -1,9 +1,7 @@
 """Episode files -> one table with a row for every agent."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,14 +10,9 @@ from numpy.typing import NDArray
 
 import tasks
 from socialnav_mj.episode import Episode, EpisodeError, check_name
-from socialnav_mj.files import finished_files
-from socialnav_mj.metrics.contacts import pedestrian_overlaps
 from socialnav_mj.metrics.metric import Kind, Metric
 from socialnav_mj.metrics.registry import METRICS, per_agent
-from socialnav_mj.processes import in_processes
 from socialnav_mj.report import columns as col
-from socialnav_mj.report.collisions import contacts_table
-from socialnav_mj.report.paired import HUMAN, pair_with_humans
 
 _TYPES = {Kind.FLAG: pa.bool_(), Kind.COUNT: pa.int64(), Kind.NUMBER: pa.float64(), Kind.NAME: pa.string()}
 
@@ -81,20 +74,6 @@ class Source:
         return int(self.metadata["draw"])
 
 
-@dataclass(frozen=True, kw_only=True)
-class Results:
-    """All agents of a run, and the episodes they come from, in the same order."""
-
-    agents: pa.Table
-    """Columns of `agents_schema`, paired with the human row."""
-    contacts: pa.Table
-    """Columns of `collisions.CONTACT_SCHEMA`."""
-    overlaps: dict[tuple[str, str, str], list[float]]
-    """Share of the replayed pedestrians of each episode that overlap another one, by dataset, variant, scenario."""
-    sources: tuple[Source, ...]
-    """One for each episode, even without agents."""
-
-
 def agents_table(episode: Episode, *, file: str = "", metrics: Sequence[Metric] = METRICS) -> pa.Table:
     """One row for every agent of an episode.
 
@@ -140,78 +119,6 @@ def agents_table(episode: Episode, *, file: str = "", metrics: Sequence[Metric] 
     return pa.table(arrays, schema=schema)
 
 
-def read_results(
-    folder: str | Path,
-    *,
-    controllers: Sequence[str] = (),
-    files: Sequence[str] | None = None,
-    metrics: Sequence[Metric] = METRICS,
-    n_jobs: int = 1,
-) -> Results:
-    """Score the episodes of a run; one episode at a time is in the memory of each process.
-
-    Args:
-        folder: The run; its episodes are `episodes/*.npz`.
-        controllers: Order of the controllers; others follow alphabetically, the human row is always last.
-        files: Names of the episodes to read; all by default.
-        metrics: That have columns.
-        n_jobs: Processes that read.
-
-    Returns:
-        Rows ordered by dataset, share, scenario, controller, draw and agent.
-
-    Raises:
-        FileNotFoundError: If there is no episode, or a named one is not there.
-        EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, or if episodes that
-            would be averaged or compared differ in their configuration; the files are named.
-    """
-    episodes = Path(folder) / "episodes"
-    there = finished_files(episodes, ".npz")
-    paths = there if files is None else sorted(episodes / name for name in files)
-    if not paths:
-        raise FileNotFoundError(f"no episodes in {episodes}; expected *.npz files")
-    if missing := sorted({*paths} - {*there}):
-        raise FileNotFoundError(f"{len(missing)} of {len(paths)} episodes are not there, the first is {missing[0]}")
-    read = list(in_processes(_read, [(path, metrics) for path in paths], n_jobs=n_jobs))
-    places = {name: place for place, name in enumerate(controllers)}
-
-    def key(item: tuple[Source, pa.Table, pa.Table, float]) -> tuple[Any, ...]:
-        source = item[0]
-        dataset, variant, scenario, controller = source.group
-        place = places.get(controller, len(places))
-        share = float(source.metadata["scenario"]["share"])
-        return dataset, variant, share, scenario, controller == HUMAN, place, controller, source.draw, source.file
-
-    read.sort(key=key)
-    sources = tuple(source for source, *_ in read)
-    _check_comparable(sources)
-    overlaps: dict[tuple[str, str, str], list[float]] = {}
-    for source, _, _, share in read:
-        if source.group[3] == HUMAN and np.isfinite(share):
-            overlaps.setdefault(source.group[:3], []).append(share)
-    return Results(
-        agents=pair_with_humans(pa.concat_tables([agents for _, agents, _, _ in read]), metrics),
-        contacts=pa.concat_tables([contacts for _, _, contacts, _ in read]),
-        overlaps=overlaps,
-        sources=sources,
-    )
-
-
-def _read(path: Path, metrics: Sequence[Metric]) -> tuple[Source, pa.Table, pa.Table, float]:
-    """An episode's description, agents, collisions, and the share of its pedestrians that overlap another one."""
-    episode = Episode.load(path)
-    try:
-        agents = agents_table(episode, file=path.name, metrics=metrics)
-        source = Source(file=path.name, metadata=episode.metadata)
-        labels = dict(zip(("dataset", "variant", "scenario", "controller"), source.group, strict=True))
-        contacts = contacts_table(episode, labels=labels | {"draw": source.draw}, file=path.name)
-        overlapping = pedestrian_overlaps(episode) > 0 if source.group[3] == HUMAN else np.zeros(0)
-        share = float(overlapping.mean()) if overlapping.size else float("nan")
-        return source, agents, contacts, share
-    except (EpisodeError, KeyError, TypeError) as error:
-        raise EpisodeError(f"{path} cannot be scored: {error}") from error
-
-
 def check_names(metadata: dict[str, Any]) -> None:
     """Draw and scenario by which an episode is filed are those that it was run with, and its names are names.
 
@@ -252,26 +159,3 @@ def scenario_configuration(source: Source) -> dict[str, Any]:
         `Scenario.as_dict` without the seed.
     """
     return {key: value for key, value in source.metadata["scenario"].items() if key != "seed"}
-
-
-def _check_comparable(sources: Sequence[Source]) -> None:
-    """Rows of one table must differ in the controller alone, and the episodes of one row in the draw alone."""
-    first: dict[tuple[str, ...], tuple[Source, Any]] = {}
-    seen: dict[tuple[Any, ...], Source] = {}
-    for source in sources:
-        dataset, variant, scenario, controller = source.group
-        twin = seen.setdefault((*source.group, source.draw), source)
-        if twin is not source:
-            name = " / ".join(source.group)
-            raise EpisodeError(f"{twin.file} and {source.file} are both draw {source.draw} of {name}; remove one")
-        for key, configuration in (
-            ((dataset, variant, "scenario", scenario), scenario_configuration(source)),
-            ((dataset, variant, "controller", controller), source.metadata["controller_config"]),
-            ((dataset, variant, "recording", ""), source.metadata["recording"]),
-        ):
-            model, expected = first.setdefault(key, (source, configuration))
-            if json.dumps(configuration, sort_keys=True) != json.dumps(expected, sort_keys=True):
-                raise EpisodeError(
-                    f"{model.file} and {source.file} have different configurations of {' / '.join(key).rstrip(' /')}: "
-                    f"{expected} and {configuration}; put them in different folders"
-                )

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from socialnav_mj.report.agents import Results, Source, scenario_configuration
+from socialnav_mj.report.agents import Source, scenario_configuration
 from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report.results import Results
 
 SUMMARY_FORMAT = "socialnav_mj.summary/1"
 

@@ -11,12 +11,13 @@ import pyarrow.parquet
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.files import csv_bytes, write_whole
-from socialnav_mj.report.agents import Results, Source, read_results
+from socialnav_mj.report.agents import Source
 from socialnav_mj.report.dialects import dialect_estimates
 from socialnav_mj.report.estimates import Estimate, summarise
 from socialnav_mj.report.page import report_page
 from socialnav_mj.report.paired import paired_differences
 from socialnav_mj.report.power import resolutions
+from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.report.run_file import RUN_FILE, RunFile, read_run_file
 from socialnav_mj.report.sections import draws_section, fault_section, paired_section, severity_section
 from socialnav_mj.report.summary import summary_of
@@ -71,7 +72,7 @@ def write_report(folder: str | Path, *, dialects: Sequence[str] = (), n_jobs: in
 
 
 def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
-    """The tables that `write_report` makes of the episodes of a run, without writing them.
+    """The tables that `write_report` makes of the episodes of a run, all scored anew, without writing them.
 
     Args:
         folder: See `write_report`.
@@ -86,12 +87,12 @@ def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
         ValueError: If run.json is not what is expected.
     """
     run = read_run_file(Path(folder) / RUN_FILE)
-    results = _results(Path(folder), run, n_jobs)
+    results = _results(Path(folder), run, n_jobs, anew=True)
     return _tables(run, results, summarise(results.agents), paired_differences(results.agents))
 
 
-def _results(folder: Path, run: RunFile | None, n_jobs: int) -> Results:
-    return read_results(folder, controllers=() if run is None else run.controllers, n_jobs=n_jobs)
+def _results(folder: Path, run: RunFile | None, n_jobs: int, *, anew: bool = False) -> Results:
+    return read_results(folder, controllers=() if run is None else run.controllers, n_jobs=n_jobs, anew=anew)
 
 
 def _tables(

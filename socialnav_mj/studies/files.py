@@ -12,7 +12,7 @@ from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import csv_bytes, write_json, write_whole
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import Recording
-from socialnav_mj.report.agents import Results
+from socialnav_mj.report.results import Results
 from socialnav_mj.studies.levels import Level
 from socialnav_mj.studies.study import Study
 

@@ -11,10 +11,10 @@ import pyarrow as pa
 from socialnav_mj.evaluation import Done, Evaluation, Job, evaluate, jobs_of
 from socialnav_mj.geometry import Array
 from socialnav_mj.report import columns as col
-from socialnav_mj.report.agents import read_results
 from socialnav_mj.report.estimates import MEASURES, draw_means, groups, measured
 from socialnav_mj.report.intervals import Interval, interval_of
 from socialnav_mj.report.markdown import bounds, number, table
+from socialnav_mj.report.results import read_results
 
 STEPS = (0.01, 0.2 / 21, 0.005, 0.0025)
 """Physics steps [s]; the first is the one that the others are compared with. The second is hardly shorter, 21 in a

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import tasks
 from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
-from socialnav_mj.report.agents import Results, read_results
+from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.studies.panel import Entry
 
 

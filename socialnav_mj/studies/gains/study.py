@@ -12,8 +12,8 @@ from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.report.results import Results
 from socialnav_mj.studies.files import write_csv, write_provenance
 from socialnav_mj.studies.gains.figure import draw_gains
 from socialnav_mj.studies.gains.page import gains_page

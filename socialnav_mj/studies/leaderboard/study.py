@@ -9,8 +9,8 @@ from socialnav_mj.controllers.specs import with_policy_of
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.report.results import Results
 from socialnav_mj.studies.files import write_csv, write_provenance
 from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of

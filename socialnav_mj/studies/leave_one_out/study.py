@@ -8,8 +8,8 @@ from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import Recording, load_recording
-from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.report.results import Results
 from socialnav_mj.studies.files import level_rows, write_csv, write_provenance
 from socialnav_mj.studies.held_out import IN_SAMPLE, learned_from, period_of_people, recording_name
 from socialnav_mj.studies.leave_one_out.comparison import SideBySide, learned_method, side_by_side

@@ -12,8 +12,8 @@ from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
-from socialnav_mj.report.agents import Results
 from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.report.results import Results
 from socialnav_mj.studies.files import level_rows, provenance_of, write_csv
 from socialnav_mj.studies.findings import Finding, examine
 from socialnav_mj.studies.held_out import held_out_levels, period_of_people

@@ -1,0 +1,121 @@
+"""The episodes of a run -> one table with a row for every agent, and what else its tables are made of."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from socialnav_mj.episode import EpisodeError
+from socialnav_mj.files import finished_files
+from socialnav_mj.metrics.metric import Metric
+from socialnav_mj.metrics.registry import METRICS
+from socialnav_mj.processes import in_processes
+from socialnav_mj.report.agents import Source, scenario_configuration
+from socialnav_mj.report.paired import HUMAN, pair_with_humans
+from socialnav_mj.report.scores import Scores, clear_old_scores, score, score_once
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """All agents of a run, and the episodes they come from, in the same order."""
+
+    agents: pa.Table
+    """Columns of `agents_schema`, paired with the human row."""
+    contacts: pa.Table
+    """Columns of `collisions.CONTACT_SCHEMA`."""
+    overlaps: dict[tuple[str, str, str], list[float]]
+    """Share of the replayed pedestrians of each episode that overlap another one, by dataset, variant, scenario."""
+    sources: tuple[Source, ...]
+    """One for each episode, even without agents."""
+
+
+def read_results(
+    folder: str | Path,
+    *,
+    controllers: Sequence[str] = (),
+    files: Sequence[str] | None = None,
+    metrics: Sequence[Metric] = METRICS,
+    n_jobs: int = 1,
+    anew: bool = False,
+) -> Results:
+    """Score the episodes of a run; one episode at a time is in the memory of each process.
+
+    What this user has scored before with all metrics, the same episode and code, is not scored again; see `scores`.
+
+    Args:
+        folder: The run; its episodes are `episodes/*.npz`.
+        controllers: Order of the controllers; others follow alphabetically, the human row is always last.
+        files: Names of the episodes to read; all by default.
+        metrics: That have columns.
+        n_jobs: Processes that read.
+        anew: Score everything, whatever was scored before.
+
+    Returns:
+        Rows ordered by dataset, share, scenario, controller, draw and agent.
+
+    Raises:
+        FileNotFoundError: If there is no episode, or a named one is not there.
+        EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, or if episodes that
+            would be averaged or compared differ in their configuration; the files are named.
+    """
+    episodes = Path(folder) / "episodes"
+    there = finished_files(episodes, ".npz")
+    paths = there if files is None else sorted(episodes / name for name in files)
+    if not paths:
+        raise FileNotFoundError(f"no episodes in {episodes}; expected *.npz files")
+    if missing := sorted({*paths} - {*there}):
+        raise FileNotFoundError(f"{len(missing)} of {len(paths)} episodes are not there, the first is {missing[0]}")
+    if anew or metrics is not METRICS:
+        read = list(in_processes(score, [(path, metrics) for path in paths], n_jobs=n_jobs))
+    else:
+        clear_old_scores()
+        read = list(in_processes(score_once, [(path,) for path in paths], n_jobs=n_jobs))
+    places = {name: place for place, name in enumerate(controllers)}
+
+    def key(scores: Scores) -> tuple[Any, ...]:
+        source = scores.source
+        dataset, variant, scenario, controller = source.group
+        place = places.get(controller, len(places))
+        share = float(source.metadata["scenario"]["share"])
+        return dataset, variant, share, scenario, controller == HUMAN, place, controller, source.draw, source.file
+
+    read.sort(key=key)
+    sources = tuple(scores.source for scores in read)
+    _check_comparable(sources)
+    overlaps: dict[tuple[str, str, str], list[float]] = {}
+    for scores in read:
+        if np.isfinite(scores.overlap):
+            overlaps.setdefault(scores.source.group[:3], []).append(scores.overlap)
+    return Results(
+        agents=pair_with_humans(pa.concat_tables([scores.agents for scores in read]), metrics),
+        contacts=pa.concat_tables([scores.contacts for scores in read]),
+        overlaps=overlaps,
+        sources=sources,
+    )
+
+
+def _check_comparable(sources: Sequence[Source]) -> None:
+    """Rows of one table must differ in the controller alone, and the episodes of one row in the draw alone."""
+    first: dict[tuple[str, ...], tuple[Source, Any]] = {}
+    seen: dict[tuple[Any, ...], Source] = {}
+    for source in sources:
+        dataset, variant, scenario, controller = source.group
+        twin = seen.setdefault((*source.group, source.draw), source)
+        if twin is not source:
+            name = " / ".join(source.group)
+            raise EpisodeError(f"{twin.file} and {source.file} are both draw {source.draw} of {name}; remove one")
+        for key, configuration in (
+            ((dataset, variant, "scenario", scenario), scenario_configuration(source)),
+            ((dataset, variant, "controller", controller), source.metadata["controller_config"]),
+            ((dataset, variant, "recording", ""), source.metadata["recording"]),
+        ):
+            model, expected = first.setdefault(key, (source, configuration))
+            if json.dumps(configuration, sort_keys=True) != json.dumps(expected, sort_keys=True):
+                raise EpisodeError(
+                    f"{model.file} and {source.file} have different configurations of {' / '.join(key).rstrip(' /')}: "
+                    f"{expected} and {configuration}; put them in different folders"
+                )
