@@ -11,8 +11,8 @@ from socialnav_mj.elementary import arccos
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
 from socialnav_mj.people import PARKING_DEPTH, people_of
-from socialnav_mj.scene import REARM_TIME, agent_name, pedestrian_name
-from socialnav_mj.scene_index import index_scene
+from socialnav_mj.scene import REARM_TIME
+from socialnav_mj.scene_index import first_invalid, index_scene
 from socialnav_mj.touch import Touch, TouchLog
 
 _SLEEP = mujoco.mjtSleepPolicy
@@ -120,6 +120,20 @@ class Physics(MujocoPhysics):
     def _agent_quaternion(self) -> Array:
         return self.data.qpos[self._index.qpos[:, None] + (3, 4, 5, 6)]
 
+    def state(self, slots: IntArray) -> Array:
+        """Everything from which the simulation of some robots, and of people who yield, goes on.
+
+        Args:
+            slots: Agent slots, shape (k,).
+
+        Returns:
+            Their rows of `qpos` and `qvel`, then those of the people if they have any, in one row.
+        """
+        index, data = self._index, self.data
+        people = (data.qpos[index.pedestrian_qpos], data.qvel[index.pedestrian_qvel])
+        robots = (data.qpos[index.agent_qpos[slots]], data.qvel[index.agent_dofs[slots]])
+        return np.concatenate([values.ravel() for values in (*robots, *people)])
+
     def set_twist(self, twist: Array) -> None:
         """Command the tendon actuators; MuJoCo clips to their ctrlrange.
 
@@ -150,7 +164,7 @@ class Physics(MujocoPhysics):
     def _set_agent_state(self, slot: int, position: tuple[float, ...], heading: float, *, present: bool) -> None:
         model, data = self.model, self.data
         address = self._index.qpos[slot]
-        data.qpos[model.jnt_qposadr[self._index.agent_joints[slot]]] = 0.0
+        data.qpos[self._index.agent_qpos[slot]] = 0.0
         data.qpos[address : address + 3] = position
         data.qpos[address + 3 : address + 7] = quaternion_of_yaw(heading)
         data.qvel[self._index.agent_dofs[slot]] = 0.0
@@ -263,31 +277,14 @@ class Physics(MujocoPhysics):
                     if np.count_nonzero(self._warnings) != kinds_of_warning:
                         break
         except PhysicsError as error:
-            raise PhysicsError(f"at {time:.2f} s: {error}{self._culprit()}") from error
+            culprit = first_invalid(self._index, data, self._new_warnings)
+            raise PhysicsError(f"at {time:.2f} s: {error}{culprit}") from error
         self._path = (None, None, None)
 
     def refresh_poses(self) -> None:
         """Bring the poses of bodies, geoms and cameras up to date, which `step` leaves one physics step behind."""
         mujoco.mj_kinematics(self.model.ptr, self.data.ptr)
         mujoco.mj_camlight(self.model.ptr, self.data.ptr)
-
-    def _culprit(self) -> str:
-        """Name whose state MuJoCo found invalid first, if that is what it warns of."""
-        warning, index = mujoco.mjtWarning, self._index
-        for kind, robots, people in (
-            (warning.mjWARN_BADQPOS, index.qpos, index.pedestrian_qpos),
-            (warning.mjWARN_BADQVEL, index.qvel, index.pedestrian_qvel),
-            (warning.mjWARN_BADQACC, index.qvel, index.pedestrian_qvel),
-        ):
-            if self._new_warnings[int(kind)]:
-                first = self.data.warning.lastinfo[int(kind)]
-                agent, person = (
-                    np.searchsorted(robots, first, side="right") - 1,
-                    np.flatnonzero((people == first).any(1)),
-                )
-                name = pedestrian_name(int(person[0])) if person.size else agent_name(int(agent))
-                return f"; first invalid in {name.rstrip('/')}"
-        return ""
 
     # Contacts
 

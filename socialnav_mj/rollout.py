@@ -7,6 +7,7 @@ import numpy as np
 from dm_control.rl import control
 from numpy.typing import NDArray
 
+from socialnav_mj.cast import NOBODY
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller, Limits, controller_config
 from socialnav_mj.episode import Episode
@@ -32,8 +33,8 @@ def rollout(
         progress: Called now and then with the simulated time that has passed [s].
 
     Returns:
-        Record of all agents; its `metadata["state_hash"]` is the SHA-256 of the simulator's state at every control
-        step.
+        Record of all agents; its `metadata["state_hash"]` is the SHA-256 of the simulated state of all agents under way
+        at every control step, whatever the size of the pool.
 
     Raises:
         PhysicsError: If the simulation became invalid.
@@ -52,8 +53,7 @@ def rollout(
         time_step = environment.step(action)
         recorder.note_action(agent, action, _checked_policy(controller, len(agent)))
         recorder.note_sample()
-        digest.update(physics.data.qpos.tobytes())
-        digest.update(physics.data.qvel.tobytes())
+        digest.update(physics.state(np.flatnonzero(task.slot_agent != NOBODY)).tobytes())
         if progress is not None and task.step % _PROGRESS_PERIOD == 0:
             progress(task.time)
     return recorder.episode(

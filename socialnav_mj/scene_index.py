@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from socialnav_mj.episode import IntArray
 from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, agent_name, pedestrian_name
@@ -23,10 +24,10 @@ class SceneIndex:
     """Bodies of each robot."""
     agent_geoms: tuple[IntArray, ...]
     """Geoms of each robot."""
-    agent_dofs: tuple[IntArray, ...]
-    """Degrees of freedom of each robot."""
-    agent_joints: tuple[IntArray, ...]
-    """Joints of each robot, the free one included."""
+    agent_qpos: IntArray
+    """(n, nq) all addresses of each robot in `qpos`."""
+    agent_dofs: IntArray
+    """(n, nv) its degrees of freedom."""
     agent_tree: IntArray
     """(n,) kinematic tree of each robot."""
     pedestrian_geom: IntArray
@@ -80,6 +81,8 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
     def belonging(body_of_each: IntArray) -> tuple[IntArray, ...]:
         return tuple(np.flatnonzero(root[body_of_each] == body) for body in robots)
 
+    sizes = np.diff(model.jnt_qposadr, append=model.nq)
+    owner_of_qpos = np.repeat(model.jnt_bodyid, sizes)
     bumpers = np.array([model.geom(name + "bumper").id for name in agents])
     bodies = np.array([model.geom(name + "body").id for name in people])
     owner = np.full(model.ngeom, -1, dtype=np.int64)
@@ -92,8 +95,8 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
         agent_tree=np.asarray(model.body_treeid)[robots].astype(np.int64),
         agent_bodies=belonging(np.arange(model.nbody)),
         agent_geoms=belonging(model.geom_bodyid),
-        agent_dofs=belonging(model.dof_bodyid),
-        agent_joints=belonging(model.jnt_bodyid),
+        agent_qpos=np.array(belonging(owner_of_qpos)),
+        agent_dofs=np.array(belonging(model.dof_bodyid)),
         pedestrian_geom=bodies,
         pedestrian_body=body,
         pedestrian_carrier=np.array([model.body(name + "carrier").id for name in yielding], dtype=np.int64),
@@ -101,6 +104,31 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
         pedestrian_qvel=_addresses([[model.joint(name + axis).dofadr[0] for axis in "xy"] for name in yielding]),
         owner=owner,
     )
+
+
+def first_invalid(index: SceneIndex, data: mujoco.MjData, warned: NDArray[np.bool_]) -> str:
+    """Name whose state MuJoCo found invalid first, if that is what it warns of.
+
+    Args:
+        index: Of the scene.
+        data: After the warnings.
+        warned: Which kinds of warning there were, by `mjtWarning`.
+
+    Returns:
+        End of a sentence; empty if no state was invalid.
+    """
+    warning = mujoco.mjtWarning
+    for kind, robots, people in (
+        (warning.mjWARN_BADQPOS, index.qpos, index.pedestrian_qpos),
+        (warning.mjWARN_BADQVEL, index.qvel, index.pedestrian_qvel),
+        (warning.mjWARN_BADQACC, index.qvel, index.pedestrian_qvel),
+    ):
+        if warned[int(kind)]:
+            first = data.warning[int(kind)].lastinfo
+            agent, person = np.searchsorted(robots, first, side="right") - 1, np.flatnonzero((people == first).any(1))
+            name = pedestrian_name(int(person[0])) if person.size else agent_name(int(agent))
+            return f"; first invalid in {name.rstrip('/')}"
+    return ""
 
 
 def _addresses(pairs: list[list[int]]) -> IntArray:

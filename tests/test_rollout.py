@@ -1,13 +1,14 @@
 """The loop of an episode: the same twice, any controller with the protocol, and a record of what was commanded."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from scenes import TINY, busy_crowd, environment_of, stand, walk
 
 import tasks
+from socialnav_mj.cast import cast_recording
 from socialnav_mj.controllers import GoStraight, PotentialField
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.geometry import twist_of_wheel_speed
@@ -60,6 +61,22 @@ def test_same_run_twice_is_bitwise_the_same_in_new_and_in_used_environments():
     assert arrays(one) == arrays(again) == arrays(other)
     assert one.metadata == again.metadata == other.metadata
     assert rollout(environment, GoStraight()).metadata["state_hash"] != one.metadata["state_hash"]
+
+
+@pytest.mark.parametrize("pedestrian", ["rigid", "compliant"])
+def test_size_of_the_pool_changes_no_bit_of_an_episode(pedestrian, monkeypatch):
+    small = rollout(busy(pedestrian=pedestrian), PotentialField(), scenario_name="made")
+
+    def with_room(*args):
+        cast = cast_recording(*args)
+        return replace(cast, n_agent_slots=cast.n_agent_slots + 5)
+
+    monkeypatch.setattr("socialnav_mj.task.cast_recording", with_room)
+    environment = busy(pedestrian=pedestrian)
+    large = rollout(environment, PotentialField(), scenario_name="made")
+    assert environment.physics.n_agents == environment.task.cast.n_agent_slots > 5
+    assert arrays(large) == arrays(small)
+    assert large.metadata == small.metadata
 
 
 def test_lonely_robot_goes_straight_to_its_goal():
