@@ -25,6 +25,7 @@ IntArray = NDArray[np.int64]
 FORMAT = "socialnav_mj.episode/4"
 MAX_BYTES = 1 << 30
 """An episode file whose arrays are larger is not read: a small file can ask for any amount of memory."""
+_OPTIONAL = {"agent_scores"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,9 +124,10 @@ class Episode:
 
     policies: tuple[str, ...]
     """Names that `agent_policy` indexes; the controller's name alone if it never switches."""
+    agent_scores: NDArray[np.float32] | None = None
+    """(t, n, policies) what each would have cost, if the controller tells; NaN where `agent_policy` is -1."""
     metadata: dict[str, Any]
-    """JSON values: controller and its configuration, scenario, recording (name, variant, checksum), versions,
-    state_hash."""
+    """JSON values: controller, its configuration, scenario, recording with its checksum, versions, state_hash."""
 
     def __post_init__(self) -> None:
         check_arrays(self)
@@ -177,7 +179,7 @@ class Episode:
         Returns:
             The path written.
         """
-        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("policies", "metadata")}
+        arrays: dict[str, Any] = {f.name: v for f in fields(self) if isinstance(v := getattr(self, f.name), np.ndarray)}
         header = {"format": FORMAT, "policies": list(self.policies), "metadata": self.metadata}
         header["digest"] = _digest(arrays, header)
         with written_whole(path) as part:
@@ -186,9 +188,7 @@ class Episode:
 
     @classmethod
     def load(cls, path: str | Path) -> "Episode":
-        """Read an episode; never runs code from the file, and refuses one that was altered after `save`.
-
-        The digest in its header is no signature: who alters a file can write another one. `verification` tells.
+        """Read an episode; never runs code from the file. Its digest tells of damage, `verification` of forgery.
 
         Args:
             path: An npz file written by `save`.
@@ -200,13 +200,13 @@ class Episode:
             FileNotFoundError: If there is no such file.
             EpisodeError: If the file is damaged or not an episode of this format.
         """
-        expected = {f.name for f in fields(cls)} - {"policies", "metadata"}
+        expected = {f.name for f in fields(cls)} - {"policies", "metadata"} - _OPTIONAL
         with _reading(path) as (file, header):
             if missing := expected - set(file.files):
                 raise EpisodeError(f"it lacks {', '.join(sorted(missing))}")
-            if unknown := set(file.files) - expected - {"header"}:
+            if unknown := set(file.files) - expected - _OPTIONAL - {"header"}:
                 raise EpisodeError(f"it has unknown arrays {', '.join(sorted(unknown))}")
-            arrays = {name: _array(file, name) for name in expected}
+            arrays = {name: _array(file, name) for name in expected | _OPTIONAL & set(file.files)}
             episode = cls(**arrays, policies=tuple(header["policies"]), metadata=header["metadata"])
             if header.get("digest") != _digest(arrays, header):
                 raise EpisodeError("it was altered after it was written: its contents do not have the header's digest")

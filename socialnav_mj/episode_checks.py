@@ -23,6 +23,7 @@ _INTEGER_FIELDS = {
     "pedestrian_person",
     *(f"contact_{name}" for name in INTEGER_COLUMNS),
 }
+_OTHER_TYPES = {"agent_scores": "float32"}
 _PER_STEP = {
     "agent_position",
     "agent_heading",
@@ -31,6 +32,7 @@ _PER_STEP = {
     "agent_tilt",
     "agent_wheel_speed",
     "agent_policy",
+    "agent_scores",
     "pedestrian_position",
     "pedestrian_heading",
     "pedestrian_velocity",
@@ -70,11 +72,13 @@ def check_arrays(episode: "Episode") -> None:
         if not isinstance(value, np.ndarray):
             continue
         shape = _expected_shape(field.name, samples=len(episode.time), sizes=sizes)
+        if field.name == "agent_scores":
+            shape = (*shape, len(episode.policies))
         if value.shape != shape:
             raise EpisodeError(f"{field.name} has shape {value.shape}; expected {shape}")
-        kind = "i" if field.name in _INTEGER_FIELDS else "f"
-        if value.dtype.kind != kind or value.dtype.itemsize != 8:
-            raise EpisodeError(f"{field.name} has type {value.dtype}; expected {'int64' if kind == 'i' else 'float64'}")
+        expected = "int64" if field.name in _INTEGER_FIELDS else _OTHER_TYPES.get(field.name, "float64")
+        if value.dtype != np.dtype(expected):
+            raise EpisodeError(f"{field.name} has type {value.dtype}; expected {expected}")
         value.flags.writeable = False
 
 
@@ -146,6 +150,10 @@ def _check_presence(episode: "Episode") -> None:
     under_way = after & (time < episode.agent_end_time - _SAME_TIME)
     if not np.array_equal(episode.agent_policy >= 0, under_way):
         raise EpisodeError("agent_policy must be -1 except from the spawn up to, not including, the end")
+    if episode.agent_scores is not None and not _is_finite_where(episode.agent_scores, under_way):
+        raise EpisodeError(
+            "agent_scores must be finite from the spawn up to, not including, the end, and NaN elsewhere"
+        )
     lies = episode.agent_tilt > OVERTURNED_TILT
     at_end = after & before & ~under_way
     if not np.array_equal(lies, at_end & (episode.agent_outcome == Outcome.OVERTURNED)):
@@ -163,8 +171,8 @@ def _stated_timestep(episode: "Episode") -> float:
         raise EpisodeError("metadata lack scenario.control_timestep") from error
 
 
-def _is_finite_where(values: NDArray[np.float64], expected: NDArray[np.bool_]) -> bool:
-    """Whether values (..., or with a last axis of two coordinates) are finite where expected and NaN elsewhere."""
+def _is_finite_where(values: NDArray[np.floating], expected: NDArray[np.bool_]) -> bool:
+    """Whether values (..., or with one more axis at the end) are finite where expected and NaN elsewhere."""
     if values.ndim > expected.ndim:
         expected = np.broadcast_to(expected[..., None], values.shape)
     return np.array_equal(np.isfinite(values), expected) and np.array_equal(np.isnan(values), ~expected)

@@ -24,7 +24,7 @@ class Recorder:
         """
         self._task = task
         self._samples: list[tuple[IntArray, Array, Array, Array, Array, Array]] = []
-        self._actions: list[tuple[IntArray, Array, IntArray]] = []
+        self._actions: list[tuple[IntArray, Array, IntArray, Array | None]] = []
         self._people: list[tuple[IntArray, Array, Array]] = []
 
     def note_sample(self) -> None:
@@ -47,16 +47,17 @@ class Recorder:
             there = people.present
             self._people.append((people.pedestrian[there], people.position[there], people.velocity[there]))
 
-    def note_action(self, agent: IntArray, action: Array, policy: IntArray) -> None:
+    def note_action(self, agent: IntArray, action: Array, policy: IntArray, scores: Array | None = None) -> None:
         """Keep what was commanded between two samples.
 
         Args:
             agent: Index of the agent in each slot before the step, `NOBODY` for none, shape (n_slots,).
             action: Wheel speeds, shape (n_slots, 2) [rad/s].
             policy: Index of the policy that chose them, shape (n_slots,).
+            scores: What each policy would have cost, shape (n_slots, policies), if the controller says so.
         """
         slots = np.flatnonzero(agent != NOBODY)
-        self._actions.append((agent[slots], action[slots], policy[slots]))
+        self._actions.append((agent[slots], action[slots], policy[slots], None if scores is None else scores[slots]))
 
     def episode(self, *, policies: tuple[str, ...], metadata: dict[str, Any]) -> Episode:
         """The record of all agents, those that never spawned included.
@@ -75,8 +76,12 @@ class Recorder:
         wheel_speed, policy = np.full((t, n, 2), np.nan), np.full((t, n), -1, dtype=np.int64)
         for k, (agent, *values) in enumerate(self._samples):
             position[k, agent], heading[k, agent], velocity[k, agent], yaw_rate[k, agent], tilt[k, agent] = values
-        for k, (agent, action, chosen) in enumerate(self._actions):
+        scored = any(scores is not None for *_, scores in self._actions)
+        scores = np.full((t, n, len(policies)), np.nan, dtype=np.float32) if scored else None
+        for k, (agent, action, chosen, own) in enumerate(self._actions):
             wheel_speed[k, agent], policy[k, agent] = action, chosen
+            if scores is not None and own is not None:
+                scores[k, agent] = own
         spawned = task.spawn_step >= 0
         end_step = np.where(task.end_step >= 0, task.end_step, t - 1)
         spawn_time = np.where(spawned, task.spawn_step * dt, np.nan)
@@ -102,6 +107,7 @@ class Recorder:
             agent_tilt=tilt,
             agent_wheel_speed=wheel_speed,
             agent_policy=policy,
+            agent_scores=scores,
             **self._pedestrians(time),
             **self._contacts(),
             policies=policies,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from socialnav_mj.cast import NOBODY
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller, Limits, controller_config
-from socialnav_mj.episode import Episode
+from socialnav_mj.episode import Array, Episode
 from socialnav_mj.provenance import episode_metadata
 from socialnav_mj.recorder import Recorder
 
@@ -38,7 +38,7 @@ def rollout(
 
     Raises:
         PhysicsError: If the simulation became invalid.
-        ValueError: If the controller's action or active policy is not allowed.
+        ValueError: If the controller's action, active policy or scores are not allowed.
     """
     task, physics = environment.task, environment.physics
     scenario: Scenario = task.scenario
@@ -51,7 +51,8 @@ def rollout(
         action = np.asarray(controller.act(time_step.observation), dtype=float)
         agent = task.slot_agent
         time_step = environment.step(action)
-        recorder.note_action(agent, action, _checked_policy(controller, len(agent)))
+        scores = _checked_scores(controller, agent != NOBODY)
+        recorder.note_action(agent, action, _checked_policy(controller, len(agent)), scores)
         recorder.note_sample()
         digest.update(physics.state(np.flatnonzero(task.slot_agent != NOBODY)).tobytes())
         if progress is not None and task.step % _PROGRESS_PERIOD == 0:
@@ -85,3 +86,16 @@ def _checked_policy(controller: Controller, n_slots: int) -> NDArray[np.int64]:
             f"into its policies {names}"
         )
     return policy.astype(np.int64)
+
+
+def _checked_scores(controller: Controller, active: NDArray[np.bool_]) -> Array | None:
+    scores = getattr(controller, "scores", None)
+    if scores is None:
+        return None
+    shape = (len(active), len(_policies(controller)))
+    if np.shape(scores) != shape or not (np.abs(np.asarray(scores)[active]) <= np.finfo(np.float32).max).all():
+        raise ValueError(
+            f"scores = {scores} of controller {controller.name!r}; expected shape {shape}, a number for each of its "
+            f"policies {_policies(controller)}, finite in single precision for each agent under way"
+        )
+    return np.asarray(scores, dtype=float)

@@ -159,7 +159,8 @@ def _differing_values(stored: Episode, again: Episode) -> tuple[str, ...]:
     found = []
     for name in (field.name for field in fields(Episode) if field.name != "metadata"):
         one, two = getattr(stored, name), getattr(again, name)
-        if not isinstance(one, np.ndarray):
+        if not (isinstance(one, np.ndarray) and isinstance(two, np.ndarray)):
+            one, two = (f"shape {v.shape}" if isinstance(v, np.ndarray) else v for v in (one, two))
             found += [] if one == two else [f"{name} is {_short(one)}, now {_short(two)}"]
         elif one.shape != two.shape:
             found.append(f"{name} has shape {one.shape}, now {two.shape}")

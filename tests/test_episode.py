@@ -35,6 +35,12 @@ def episode():
     return make()
 
 
+def scored(episode):
+    """The episode as of a controller that tells what its one policy cost."""
+    scores = np.where(episode.agent_active[..., None], 1.5, np.nan).astype(np.float32)
+    return replace(episode, agent_scores=scores)
+
+
 def changed(episode, name, edit):
     """The episode with one array edited in a copy."""
     array = getattr(episode, name).copy()
@@ -94,6 +100,21 @@ def test_broken_invariant_is_named(episode, name, edit, named):
         changed(episode, name, edit)
 
 
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        (lambda a: a[..., :0], r"agent_scores has shape \(31, 3, 0\); expected \(31, 3, 1\)"),
+        (lambda a: a.astype(float), "agent_scores has type float64; expected float32"),
+        (setter(5, 0, value=np.nan), "agent_scores must be finite from the spawn"),
+        (setter(5, 0, value=np.inf), "agent_scores must be finite from the spawn"),
+        (setter(30, 0, value=1.0), "agent_scores must be finite from the spawn"),
+    ],
+)
+def test_broken_scores_are_named(episode, edit, named):
+    with pytest.raises(EpisodeError, match=named):
+        changed(scored(episode), "agent_scores", edit)
+
+
 def test_metadata_without_a_time_step_are_refused(episode):
     with pytest.raises(EpisodeError, match=r"metadata lack scenario.control_timestep"):
         replace(episode, metadata={})
@@ -132,6 +153,19 @@ def equal(one, two):
             assert a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes(), field.name
         else:
             assert a == b, field.name
+
+
+def test_scores_travel_in_the_file_and_are_told_by_its_digest(episode, tmp_path):
+    path = scored(episode).save(tmp_path / "a.npz")
+    equal(scored(episode), Episode.load(path))
+    with np.load(path) as file:
+        arrays = dict(file)
+    for name, change in (("b", arrays | {"agent_scores": 2.0 * arrays["agent_scores"]}), ("c", arrays)):
+        if name == "c":
+            del change["agent_scores"]
+        np.savez(tmp_path / f"{name}.npz", **change)
+        with pytest.raises(EpisodeError, match="it was altered after it was written"):
+            Episode.load(tmp_path / f"{name}.npz")
 
 
 def test_saved_episode_is_loaded_bit_by_bit_and_equal_episodes_give_equal_files(episode, tmp_path):

@@ -169,6 +169,34 @@ def test_active_policy_that_is_not_allowed_is_named(policy):
         rollout(busy(), controller)
 
 
+class Scoring(Switching):
+    """Says what its two policies would have cost: the number of its call, and twice that; nothing of empty slots."""
+
+    @property
+    def scores(self):
+        cost = np.where(self.seen[-1]["active"], len(self.returned), np.nan)
+        return np.stack([cost, 2.0 * cost], axis=1)
+
+
+def test_scores_are_recorded_in_single_precision_for_agents_under_way():
+    episode = rollout(busy(), Scoring())
+    call = np.arange(1.0, len(episode.time) + 1.0)[:, None]
+    expected = np.where(episode.agent_active, call, np.nan)
+    assert episode.agent_scores.dtype == np.float32 and 0.0 < episode.agent_active.mean() < 1.0
+    np.testing.assert_array_equal(episode.agent_scores, np.stack([expected, 2.0 * expected], axis=2))
+    assert rollout(busy(), Switching()).agent_scores is None
+
+
+@pytest.mark.parametrize(
+    "scores", [0.0, np.zeros(9), np.full((2, 1), np.nan), np.full((2, 1), 1e300), np.zeros((2, 3))]
+)
+def test_scores_that_are_not_allowed_are_named(scores):
+    environment = environment_of(walk([(0, 0), (6, 0)], 1.0), walk([(0, 3), (6, 3)], 1.0), agents=(1, 2))
+    controller = type("Wrong", (Noted,), {"scores": scores})()
+    with pytest.raises(ValueError, match=r"scores = [\s\S]* of controller 'noted'; expected shape \(2, 1\)"):
+        rollout(environment, controller)
+
+
 def test_progress_tells_the_simulated_time_that_has_passed():
     told = []
     episode = rollout(busy(), Noted(), progress=told.append)

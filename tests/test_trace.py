@@ -3,11 +3,13 @@
 import json
 import warnings
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import rerun as rr
 from episodes import Agent, Pedestrian, Touch, build_episode, line
 from rerun.chunk import RrdReader
 
@@ -229,6 +231,38 @@ def test_blueprint_names_every_kind_of_view(path: Path) -> None:
         "TextDocument": 1,
         "TextLog": 1,
     }
+
+
+def scored() -> Episode:
+    """The crowd, led by a controller that tells what its policies cost: 1 and 2 s at first, .1 s more a step."""
+    one = crowd()
+    cost = 0.1 * np.arange(len(one.time))[:, None, None] + [1.0, 2.0]
+    return replace(one, agent_scores=np.where(one.agent_active[..., None], cost, np.nan).astype(np.float32))
+
+
+def test_scores_have_a_line_a_policy_for_all_and_for_chosen_robots(tmp_path: Path) -> None:
+    one = scored()
+    static, rows = read(write_trace(one, tmp_path / "scored.rrd"))
+    for k, policy in enumerate(one.policies):
+        lane = rows[f"/all/score/{policy}"]["Scalars:scalars"]
+        found = np.array([lane[nanoseconds(t)] for t in one.time])
+        np.testing.assert_array_equal(found, one.agent_scores[..., k])
+        assert static[f"/all/score/{policy}"]["SeriesLines:names"] == [f"robot {i}" for i in one.agent_person]
+    assert static["/chosen/score/robot_3"]["SeriesLines:names"] == ["robot 3 cautious", "robot 3 bold"]
+    chosen = rows["/chosen/score/robot_3"]["Scalars:scalars"]
+    np.testing.assert_allclose(chosen[nanoseconds(0.4)], [1.2, 2.2], atol=1e-6)
+    assert len(chosen) == len(one.time[one.window(0)])
+
+
+def test_scores_are_shown_where_there_are_any_and_a_name_may_hold_anything(path: Path, tmp_path: Path) -> None:
+    assert not [entity for entity in read(path)[1] if "/score" in entity]
+    specs = ("mpc(preset='calm')", "a/b: \\ c")
+    other = write_trace(replace(scored(), policies=specs), tmp_path / "specs.rrd")
+    entities = {entity for entity in read(other)[1] if entity.startswith("/all/score/")}
+    assert entities == {f"/all/score/{rr.escape_entity_path_part(spec)}" for spec in specs}
+    blueprint = list(RrdReader(other).blueprints())
+    text = repr([c.to_record_batch().to_pydict() for c in RrdReader(other).stream(store=blueprint[0]).to_chunks()])
+    assert "/chosen/score" in text and "/all/score" in text
 
 
 def test_two_files_of_one_episode_mean_the_same(episode: Episode, path: Path, tmp_path: Path) -> None:

@@ -140,6 +140,19 @@ def test_whatever_is_altered_is_found_and_named(run: Path, tmp_path: Path) -> No
         assert any(difference.startswith(name) for difference in verdict.differences), (name, verdict)
 
 
+def test_scores_that_are_altered_or_left_out_are_found(tmp_path: Path) -> None:
+    plan = Evaluation(dataset=TINY, scenarios=("scenario_3",), controllers=("selector",), draws=1, seed=1)
+    list(evaluate(plan, tmp_path / "run", n_jobs=1))
+    episode = Episode.load(tmp_path / "run" / "episodes" / EPISODE.replace("go_straight", "selector"))
+    scores = episode.agent_scores
+    assert scores is not None
+    for name, given in (("a", scores), ("b", 2 * scores), ("c", None)):
+        replace(episode, agent_scores=given).save(tmp_path / "episodes" / f"{name}.npz")
+    same, other, none = (v for v in verify(tmp_path, dataset=TINY, n_jobs=1) if v.path.suffix == ".npz")
+    assert same.same and other.differences[0].startswith("agent_scores differs in")
+    assert none.differences == (f"agent_scores is None, now 'shape {scores.shape}'",)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

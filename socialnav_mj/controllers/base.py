@@ -92,8 +92,8 @@ class TwistController(ABC):
     """Base of controllers that think in twists: limits and wheel mapping are done here.
 
     Subclasses are frozen dataclasses in spirit: their fields are their configuration, plain JSON values or other
-    controllers (`IS_CONTROLLER`), and travel in every episode. A controller that switches between policies sets
-    `policies` and overrides `active_policy`.
+    controllers (`IS_CONTROLLER`), and travel in every episode. Those that switch between policies derive from
+    `controllers.switching`.
     """
 
     name: str
@@ -107,6 +107,11 @@ class TwistController(ABC):
     @property
     def active_policy(self) -> NDArray[np.int64] | None:
         """Index into `policies` of what chose each row of the last action, shape (n_agents,); None means 0."""
+        return None
+
+    @property
+    def scores(self) -> Array | None:
+        """What each of `policies` would have cost at the last action, shape (n_agents, policies); None if unknown."""
         return None
 
     def reset(self, limits: Limits, *, seed: int = 0) -> None:

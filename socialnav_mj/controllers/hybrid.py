@@ -6,9 +6,10 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.controllers.base import IS_CONTROLLER, Limits, Observation, TwistController
+from socialnav_mj.controllers.base import IS_CONTROLLER, Observation, TwistController
 from socialnav_mj.controllers.potential_field import PotentialField
 from socialnav_mj.controllers.replay_irl import ReplayIRL
+from socialnav_mj.controllers.switching import SwitchingController
 from socialnav_mj.geometry import Array
 
 Who = Literal["pedestrians", "anyone"]
@@ -35,7 +36,7 @@ def nearest_distance(observation: Observation, *, who: Who) -> Array:
 
 
 @dataclass(kw_only=True)
-class Hybrid(TwistController):
+class Hybrid(SwitchingController):
     """Acts as `near` while a pedestrian is nearer than the switch distance, else as `far`.
 
     The paper's text speaks of the nearest pedestrian; its figures are only possible if other agents do not count, so
@@ -51,7 +52,6 @@ class Hybrid(TwistController):
     who: Who = "pedestrians"
     """Whose distance counts: replayed pedestrians, or "anyone"."""
     name: str = "hybrid"
-    _acting: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.who not in get_args(Who):
@@ -65,36 +65,17 @@ class Hybrid(TwistController):
                 )
 
     @property
-    def policies(self) -> tuple[str, ...]:
-        """Names of the two controllers, near first."""
-        return self.near.name, self.far.name
+    def members(self) -> tuple[TwistController, ...]:
+        """The two controllers, near first."""
+        return self.near, self.far
 
-    @property
-    def active_policy(self) -> NDArray[np.int64]:
-        """0 where the near controller chose the last action, 1 where the far one did, shape (n_agents,)."""
-        return self._acting.copy()
-
-    def reset(self, limits: Limits, *, seed: int = 0) -> None:
-        """Reset both controllers for the episode to come.
+    def choose(self, observation: Observation) -> NDArray[np.int64]:
+        """Compare distances with the switch distance.
 
         Args:
-            limits: What the robots of that episode can do.
-            seed: Given to both.
-        """
-        super().reset(limits, seed=seed)
-        for controller in (self.near, self.far):
-            controller.reset(limits, seed=seed)
-        self._acting = np.zeros(0, dtype=np.int64)
-
-    def twist(self, observation: Observation) -> Array:
-        """Twist of whichever controller is in charge of each agent.
-
-        Args:
-            observation: Keys as in `socialnav_mj.observation`; both controllers see all of it.
+            observation: Keys as in `socialnav_mj.observation`.
 
         Returns:
-            Shape (n_agents, 2) [m/s], [rad/s].
+            0 where the near controller acts, 1 where the far one does, shape (n_agents,).
         """
-        self._acting = np.where(nearest_distance(observation, who=self.who) < self.switch_distance, 0, 1)
-        near, far = (controller.twist(observation) for controller in (self.near, self.far))
-        return np.where((self._acting == 0)[:, None], near, far)
+        return np.where(nearest_distance(observation, who=self.who) < self.switch_distance, 0, 1)

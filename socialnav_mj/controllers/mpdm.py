@@ -21,6 +21,7 @@ from socialnav_mj.controllers.prediction import Prediction, load_prediction
 from socialnav_mj.controllers.replay_irl import ReplayIRL
 from socialnav_mj.controllers.social_force import SocialForce
 from socialnav_mj.controllers.stand_still import StandStill
+from socialnav_mj.controllers.switching import SwitchingController, check_candidates
 from socialnav_mj.geometry import Array
 
 STEPS = 12
@@ -32,7 +33,7 @@ def _default_candidates() -> tuple[TwistController, ...]:
 
 
 @dataclass(kw_only=True)
-class MPDM(TwistController):
+class MPDM(SwitchingController):
     """Rolls each candidate out in closed loop, as if it drove alone from now on, and lets the best drive the next step.
 
     A roll-out sees the nearest others move as predicted; the candidate reacts to them, they do not react to it.
@@ -58,29 +59,16 @@ class MPDM(TwistController):
             if not (isinstance(value, (int, float)) and isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} = {value!r} is not allowed; allowed: numbers >= 0")
         self.candidates = tuple(self.candidates)
-        if len(self.candidates) < 2 or not all(isinstance(one, TwistController) for one in self.candidates):
-            raise ValueError(
-                f"candidates = {self.candidates!r} is not allowed; allowed: two or more of TwistController"
-            )
+        check_candidates(self.candidates)
         self._prediction = load_prediction(self.prediction, steps=STEPS + 1)
 
     @property
-    def policies(self) -> tuple[str, ...]:
-        """Names of the candidates."""
-        return tuple(candidate.name for candidate in self.candidates)
-
-    @property
-    def active_policy(self) -> NDArray[np.int64]:
-        """Which candidate chose the last action, shape (n_agents,)."""
-        return self._acting.copy()
-
-    @property
-    def scores(self) -> Array:
-        """What each candidate's last roll-out cost, less the bonus, (n_agents, n_candidates); NaN in inactive slots."""
-        return self._scores.copy()
+    def members(self) -> tuple[TwistController, ...]:
+        """The candidates."""
+        return self.candidates
 
     def reset(self, limits: Limits, *, seed: int = 0) -> None:
-        """Reset all candidates for the episode to come.
+        """Reset all candidates for the episode to come, and those that drive in the imagination.
 
         Args:
             limits: What the robots of that episode can do.
@@ -90,22 +78,17 @@ class MPDM(TwistController):
         self._terms: Terms = terms_of(limits, steps=STEPS)
         self._foresight = Foresight(self._prediction, limits, steps=STEPS + 1)
         self._imagined = [deepcopy(candidate) for candidate in self.candidates]
-        in_roll_outs = replace(limits, control_timestep=self._terms.step)
-        for candidate, imagined in zip(self.candidates, self._imagined, strict=True):
-            candidate.reset(limits, seed=seed)
-            imagined.reset(in_roll_outs, seed=seed)
-        self._seed, self._limits_ahead = seed, in_roll_outs
-        self._acting, self._person = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-        self._scores = np.zeros((0, len(self.candidates)))
+        self._seed, self._limits_ahead = seed, replace(limits, control_timestep=self._terms.step)
+        self._person = np.zeros(0, dtype=np.int64)
 
-    def twist(self, observation: Observation) -> Array:
-        """Twist of the candidate whose roll-out costs least.
+    def choose(self, observation: Observation) -> NDArray[np.int64]:
+        """Roll every candidate out; whoever acted at the step before is cheaper by the bonus.
 
         Args:
             observation: Keys as in `socialnav_mj.observation`.
 
         Returns:
-            Shape (n_agents, 2) [m/s], [rad/s]; 0 for inactive slots.
+            The candidate whose roll-out costs least, shape (n_agents,).
         """
         active = observation["active"]
         rows = np.flatnonzero(active)
@@ -119,12 +102,19 @@ class MPDM(TwistController):
         if len(self._person) == len(person):
             again = np.flatnonzero(active & (self._person == person))
             costs[again, self._acting[again]] -= self.bonus
-        self._person, self._scores = person, costs
-        self._acting = np.zeros(len(active), dtype=np.int64)
-        self._acting[rows] = costs[rows].argmin(axis=1) if rows.size else 0
-        twists = np.stack([candidate.twist(observation) for candidate in self.candidates], axis=1)
-        chosen: Array = twists[np.arange(len(active)), self._acting]
-        return chosen * active[:, None]
+        self._person = person
+        return self.cheapest(costs)
+
+    def twist(self, observation: Observation) -> Array:
+        """Twist of the candidate whose roll-out costs least.
+
+        Args:
+            observation: Keys as in `socialnav_mj.observation`.
+
+        Returns:
+            Shape (n_agents, 2) [m/s], [rad/s]; 0 for inactive slots.
+        """
+        return super().twist(observation) * observation["active"][:, None]
 
     def _cost(self, candidate: TwistController, imagined: Imagination, contact: Array) -> Array:
         """Of one candidate's roll-outs, shape (n,) [m]."""

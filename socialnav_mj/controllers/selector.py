@@ -6,13 +6,13 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.controllers.base import IS_CONTROLLER, Limits, Observation, TwistController
+from socialnav_mj.controllers.base import IS_CONTROLLER, Observation
 from socialnav_mj.controllers.mpc import MPC
-from socialnav_mj.geometry import Array
+from socialnav_mj.controllers.switching import SwitchingController
 
 
 @dataclass(kw_only=True)
-class Selector(TwistController):
+class Selector(SwitchingController):
     """Lets both planners plan, and compares what their plans lack in clearance.
 
     The paper switches by the distance to the nearest pedestrian; this one by what each policy would bring about. Both
@@ -26,7 +26,6 @@ class Selector(TwistController):
     tolerance: float = 0.15
     """By how much the calm plan's clearance cost may exceed the free plan's, >= 0; chosen on draws 0-9 [s]."""
     name: str = "selector"
-    _acting: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.tolerance, (int, float)) and isfinite(self.tolerance) and self.tolerance >= 0.0):
@@ -36,38 +35,21 @@ class Selector(TwistController):
                 raise ValueError(f"{name} = {getattr(self, name)!r} is not allowed; allowed: mpc with any settings")
 
     @property
-    def policies(self) -> tuple[str, ...]:
-        """Names of the two planners, calm first."""
-        return self.calm.name, self.free.name
+    def members(self) -> tuple[MPC, MPC]:
+        """The two planners, calm first."""
+        return self.calm, self.free
 
-    @property
-    def active_policy(self) -> NDArray[np.int64]:
-        """0 where the calm planner chose the last action, 1 where the free one did, shape (n_agents,)."""
-        return self._acting.copy()
-
-    def reset(self, limits: Limits, *, seed: int = 0) -> None:
-        """Reset both planners for the episode to come.
+    def choose(self, observation: Observation) -> NDArray[np.int64]:
+        """Compare what both plans cost for their lack of clearance; the tolerance is subtracted from the calm one's.
 
         Args:
-            limits: What the robots of that episode can do.
-            seed: Given to both.
-        """
-        super().reset(limits, seed=seed)
-        for planner in (self.calm, self.free):
-            planner.reset(limits, seed=seed)
-        self._acting = np.zeros(0, dtype=np.int64)
-
-    def twist(self, observation: Observation) -> Array:
-        """First step of the calm plan, or of the free one where the calm one is not safe enough.
-
-        Args:
-            observation: Keys as in `socialnav_mj.observation`; both planners see all of it.
+            observation: Keys as in `socialnav_mj.observation`; uses active.
 
         Returns:
-            Shape (n_agents, 2) [m/s], [rad/s].
+            0 where the calm planner acts, 1 where the free one does, shape (n_agents,).
         """
-        calm, free = (planner.twist(observation) for planner in (self.calm, self.free))
-        risk = self.calm.choice.clearance - self.free.choice.clearance
-        self._acting = np.zeros(len(calm), dtype=np.int64)
-        self._acting[observation["active"]] = risk > self.tolerance
-        return np.where((self._acting == 0)[:, None], calm, free)
+        active = observation["active"]
+        costs = np.full((len(active), 2), np.nan)
+        costs[active, 0] = self.calm.choice.clearance - self.tolerance
+        costs[active, 1] = self.free.choice.clearance
+        return self.cheapest(costs)

@@ -1,7 +1,11 @@
 """How a trace looks when it is opened: colours, names of the entities, and the layout of the viewer's window."""
 
+from collections.abc import Sequence
+
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from socialnav_mj.geometry import Array
 from socialnav_mj.trace.sink import TIMELINE
@@ -54,6 +58,18 @@ KEY = """
 
 POLICIES: tuple[Colour, ...] = (SKY, (230, 159, 0), GREEN, PINK, YELLOW, VERMILION)
 """One colour for each policy; they repeat if there are more."""
+
+
+def policy_colours(policies: Sequence[str]) -> list[Colour]:
+    """Colours of the lanes and lines of policies.
+
+    Args:
+        policies: Their names.
+
+    Returns:
+        One for each.
+    """
+    return [POLICIES[i % len(POLICIES)] for i in range(len(policies))]
 
 
 TRAIL_RADIUS, NAME_RADIUS = 0.025, 0.05
@@ -125,7 +141,15 @@ def floor(low: Array, high: Array) -> rr.AsComponents:
     return rr.Boxes3D(centers=[[*middle, -0.03]], half_sizes=[[*half, 0.02]], colors=FLOOR, fill_mode="solid")
 
 
-def layout(low: Array, high: Array, times: Array, *, max_speed: float, several_policies: bool) -> rrb.Blueprint:
+def layout(
+    low: Array,
+    high: Array,
+    times: Array,
+    *,
+    max_speed: float,
+    several_policies: bool,
+    scores: NDArray[np.float32] | None,
+) -> rrb.Blueprint:
     """The window: oblique and top-down view, time series, lanes of states, configuration and log of events.
 
     Args:
@@ -134,6 +158,7 @@ def layout(low: Array, high: Array, times: Array, *, max_speed: float, several_p
         times: (2,) first and last sample [s].
         max_speed: What the robots' wheels can do [m/s].
         several_policies: Whether to show lanes of the policy in use.
+        scores: What is shown of policies' costs, of any shape; None if nothing is.
 
     Returns:
         A blueprint.
@@ -158,8 +183,9 @@ def layout(low: Array, high: Array, times: Array, *, max_speed: float, several_p
         rrb.Horizontal(
             rrb.Vertical(_spatial("Crowd", oblique), _spatial("From above", above), row_shares=[1.0, 1.15]),
             rrb.Vertical(
-                rrb.Tabs(*_series("speed", "Speed [m/s]", 1.25 * max_speed, axis)),
-                rrb.Tabs(*_series("nearest_human", "Nearest pedestrian [m]", 4.0, axis)),
+                rrb.Tabs(*_series("speed", "Speed [m/s]", (0.0, 1.25 * max_speed), axis)),
+                rrb.Tabs(*_series("nearest_human", "Nearest pedestrian [m]", (0.0, 4.0), axis)),
+                *_scores(scores, axis),
                 *(rrb.Tabs(*pair) for pair in zip(every, chosen, strict=True)),
             ),
             rrb.Vertical(
@@ -201,9 +227,17 @@ def _past(seconds: float | None) -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=boundary.cursor_relative(seconds=0.0))
 
 
-def _series(quantity: str, title: str, top: float, axis: rrb.TimeAxis) -> list[rrb.TimeSeriesView]:
+def _scores(scores: NDArray[np.float32] | None, axis: rrb.TimeAxis) -> list[rrb.Tabs]:
+    """From the least to what 19 of 20 do not exceed: a policy that runs into somebody costs many times the others."""
+    if scores is None or np.isnan(scores).all():
+        return []
+    low, high = np.nanpercentile(scores, (0.0, 95.0))
+    return [rrb.Tabs(*_series("score", "Cost of each policy", (float(low), float(high) + 1e-3), axis))]
+
+
+def _series(quantity: str, title: str, span: tuple[float, float], axis: rrb.TimeAxis) -> list[rrb.TimeSeriesView]:
     """The chosen robots over the whole episode; all robots, too many for that, around the time cursor."""
-    height = rrb.ScalarAxis(range=(0.0, top))
+    height = rrb.ScalarAxis(range=span)
     limits = f"/limits/{quantity}/**"
     boundary = rr.TimeRangeBoundary
     around = rr.TimeRange(

@@ -10,7 +10,8 @@
 | /scene/touches/now, all | one row a touch: place, partner, severity; the views show the past 2 s, and all so far |
 | /scene/chosen | number of each robot that is followed closely |
 | /all/speed, nearest_human | (n_agents,) values a step, in the order of the Episode |
-| /chosen/speed, nearest_human, state, policy | one entity for each robot followed closely |
+| /all/score/POLICY | the same, of what a policy would have cost, if the controller says so |
+| /chosen/speed, nearest_human, score, state, policy | one entity for each robot followed closely |
 | /limits/speed, nearest_human | lines to read the series against |
 | /lanes/state, policy | every robot, one after the other in as few lanes as there is room in |
 | /events | log of late spawns, touches and ends |
@@ -87,6 +88,7 @@ def _write(episode: Episode, path: Path) -> None:
         episode.time[[0, -1]],
         max_speed=metadata["scenario"]["robot"]["max_speed"],
         several_policies=len(episode.policies) > 1,
+        scores=episode.agent_scores,
     )
     identity = uuid.uuid5(uuid.NAMESPACE_OID, f"{name} {metadata['state_hash']}")
     sink = Sink(path, name=name, recording_id=str(identity), blueprint=layout)
@@ -95,9 +97,10 @@ def _write(episode: Episode, path: Path) -> None:
         write_scene(episode, sink, chosen, low, high)
         _series(episode, sink, chosen)
         _limits(episode, sink)
+        _scores(episode, sink, chosen)
         _lanes(episode, sink, "state", state_changes(episode, linger=look.TOUCH_SECONDS), look.STATES, chosen)
         if len(episode.policies) > 1:
-            colours = {name: look.POLICIES[i % len(look.POLICIES)] for i, name in enumerate(episode.policies)}
+            colours = dict(zip(episode.policies, look.policy_colours(episode.policies), strict=True))
             _lanes(episode, sink, "policy", policy_changes(episode), colours, chosen)
         if story := events(episode):
             times, levels, texts = (list(column) for column in zip(*story, strict=True))
@@ -169,6 +172,24 @@ def _series(episode: Episode, sink: Sink, chosen: IntArray) -> None:
             window, entity = episode.window(agent), f"/chosen/{quantity}/robot_{people[agent]}"
             sink.static(entity, rr.SeriesLines(names=names[agent], colors=colour, widths=2.0))
             sink.columns(entity, episode.time[window], rr.Scalars.columns(scalars=values[window, agent]))
+
+
+def _scores(episode: Episode, sink: Sink, chosen: IntArray) -> None:
+    """What each policy would have cost: a line a policy, in the colour of its lane."""
+    if episode.agent_scores is None or not episode.n_agents:
+        return
+    people, colours = episode.agent_person, look.policy_colours(episode.policies)
+    every = [f"robot {person}" for person in people]
+    for p, (policy, colour) in enumerate(zip(episode.policies, colours, strict=True)):
+        entity = f"/all/score/{rr.escape_entity_path_part(policy)}"
+        sink.static(entity, rr.SeriesLines(names=every, widths=[0.7] * len(every), colors=[colour] * len(every)))
+        sink.columns(entity, episode.time, rr.Scalars.columns(scalars=episode.agent_scores[..., p].astype(float)))
+    for agent in chosen:
+        window, entity = episode.window(agent), f"/chosen/score/robot_{people[agent]}"
+        names = [f"robot {people[agent]} {policy}" for policy in episode.policies]
+        sink.static(entity, rr.SeriesLines(names=names, colors=colours, widths=[2.0] * len(names)))
+        own = episode.agent_scores[window, agent].astype(float)
+        sink.columns(entity, episode.time[window], rr.Scalars.columns(scalars=own))
 
 
 def _limits(episode: Episode, sink: Sink) -> None:
