@@ -13,6 +13,7 @@ from socialnav_mj.features import (
     GOAL_FLAG,
     N_FLAGS,
     SIGHT,
+    Affinity,
     Continuous,
     Risk,
     View,
@@ -307,9 +308,22 @@ def test_states_carry_lowered_flags_under_way_and_one_raised_at_the_end(features
     np.testing.assert_array_equal(mirror_state(features, state)[0, :-2], features.mirror(values)[0])
 
 
+def test_affinity_map_counts_and_averages_the_people_of_a_cell():
+    """Two ahead at 2 m, who close at 1 and 3 m/s; one 3 m to the left, who crosses forwards at 1 m/s; one too far."""
+    people = [(2.0, 0.0), (2.0, 0.01), (0.0, 3.0), (7.0, 0.0)]
+    values = Affinity()(view(people=people, velocities=[(-1.0, 0.0), (-3.0, 0.0), (1.0, 0.0), (-1.0, 0.0)]))[0]
+    expected = np.zeros(78)
+    expected[:6] = 1.0, 0.0, 0.3, np.exp(-3.0), 0.5, 0.0
+    expected[14], expected[22 + 2] = 2 / 3, 1 / 2
+    expected[38] = 1.0  # mean closing speed 2 m/s
+    expected[70 + 2] = -0.5
+    np.testing.assert_allclose(values, expected, atol=0.01)
+    np.testing.assert_array_equal(np.flatnonzero(values[6:]) + 6, [14, 24, 38, 62, 72])
+
+
 def test_feature_sets_are_found_by_name_and_errors_name_them():
     assert feature_set("risk").size == 80 and feature_set("continuous").size == 54
-    with pytest.raises(ValueError, match="unknown feature set 'rsk'; available: continuous, companions, risk"):
+    with pytest.raises(ValueError, match="unknown feature set 'rsk'; available: continuous, companions, risk, sam"):
         feature_set("rsk")
 
 

@@ -4,6 +4,7 @@ Everything is taken from an observation in the agent's own frame (see `socialnav
 change when the scene is moved or turned. Pedestrians and other agents are people alike.
 """
 
+from socialnav_mj.features.affinity import Affinity
 from socialnav_mj.features.companions import Companions
 from socialnav_mj.features.continuous import SIGHT, Continuous
 from socialnav_mj.features.risk import Risk
@@ -25,6 +26,7 @@ __all__ = [
     "HORIZON",
     "N_FLAGS",
     "SIGHT",
+    "Affinity",
     "Companions",
     "Continuous",
     "FeatureSet",

@@ -41,12 +41,7 @@ class Continuous:
         """
         n, s = len(view.goal), self.n_sectors
         result = np.zeros((n, self.size))
-        distance_to_goal = np.hypot(view.goal[:, 0], view.goal[:, 1])
-        result[:, :2] = view.goal / np.maximum(distance_to_goal, 1e-9)[:, None]
-        result[:, 2] = np.minimum(distance_to_goal, 10.0) / 10.0
-        result[:, 3] = exp(-distance_to_goal)
-        result[:, 4] = view.twist[:, 0]
-        result[:, 5] = view.twist[:, 1] / 2.618
+        result[:, :6] = self.of_self(view)
         distance = np.hypot(view.position[..., 0], view.position[..., 1])
         seen = view.present & (distance < SIGHT)
         agent, person = np.nonzero(seen)
@@ -66,6 +61,20 @@ class Continuous:
         result[agent, 6 + s + sector] = np.clip(closing[order] / 2.0, -1.0, 1.0)
         result[agent, 6 + 2 * s + sector] = np.clip(tangential[order] / 2.0, -1.0, 1.0)
         return result
+
+    def of_self(self, view: View) -> Array:
+        """The first six numbers of the class's table.
+
+        Args:
+            view: What n agents see.
+
+        Returns:
+            Shape (n, 6).
+        """
+        distance = np.hypot(view.goal[:, 0], view.goal[:, 1])
+        bearing = view.goal / np.maximum(distance, 1e-9)[:, None]
+        nearness = [np.minimum(distance, 10.0) / 10.0, exp(-distance)]
+        return np.stack([*bearing.T, *nearness, view.twist[:, 0], view.twist[:, 1] / 2.618], axis=1)
 
     def mirror(self, features: Array) -> Array:
         """What the scene would give with left and right exchanged.

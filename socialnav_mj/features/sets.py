@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from socialnav_mj.features.affinity import Affinity
 from socialnav_mj.features.companions import Companions
 from socialnav_mj.features.continuous import Continuous
 from socialnav_mj.features.risk import Risk
@@ -23,7 +24,9 @@ class FeatureSet(Protocol):
         """Features of the mirrored scene (left and right exchanged), shape (..., size)."""
 
 
-FEATURE_SETS: dict[str, FeatureSet] = {"continuous": Continuous(), "companions": Companions(), "risk": Risk()}
+FEATURE_SETS: dict[str, FeatureSet] = {
+    features.name: features for features in (Continuous(), Companions(), Risk(), Affinity())
+}
 
 
 def feature_set(name: str) -> FeatureSet:

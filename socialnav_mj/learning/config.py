@@ -143,9 +143,10 @@ class TrainingConfig:
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)} is not allowed; allowed: integers >= 1")
         feature_set(self.features)
-        if self.matching == "density" and self.features == "risk":
+        if self.matching == "density" and self.features not in ("continuous", "companions"):
             raise ValueError(
-                "matching = 'density' is not allowed with features = 'risk', which see 1.3 m; allowed: 'none'"
+                f"matching = 'density' is not allowed with features = {self.features!r}, which do not tell how far "
+                "people are; allowed: 'none'"
             )
         for name in ("gamma", "kept_from"):
             if not 0.0 <= getattr(self, name) < 1.0:
