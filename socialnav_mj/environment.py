@@ -1,5 +1,6 @@
 """From keyword arguments to a scenario, and from a scenario to a dm_control environment."""
 
+from functools import partial
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,7 @@ def build_environment(
     time_limit: float = float("inf"),
     random: int | np.random.RandomState | None = None,
     environment_kwargs: dict[str, Any] | None = None,
+    grow: bool = False,
 ) -> Environment:
     """A dm_control environment of a recording that is at hand and a scenario that is final.
 
@@ -91,13 +93,17 @@ def build_environment(
         time_limit: The episode is cut after this time [s].
         random: Kept by the task, which draws nothing from it.
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
+        grow: Begin with as many robots as are likely to be in the scene at once, and compile it anew if more are. No
+            bit of an episode depends on it, but who holds on to the model, as dm_control's viewer does, must not see it
+            change.
 
     Returns:
         An environment whose task is a `CrowdTask` and whose physics is a `Physics`.
     """
     task = CrowdTask(recording, scenario, random=random)
     everywhere = np.concatenate(recording.positions)
-    model = build_model(
+    build = partial(
+        build_model,
         scenario,
         n_agent_slots=task.cast.n_agent_slots,
         n_pedestrian_slots=task.cast.n_pedestrian_slots,
@@ -105,7 +111,9 @@ def build_environment(
         high=everywhere.max(axis=0),
     )
     return Environment(
-        Physics.from_mujoco(model),
+        Physics.from_mujoco(
+            build(n_robots=task.cast.n_likely_agents if grow else None), build=lambda n: build(n_robots=n)
+        ),
         task,
         control_timestep=scenario.control_timestep,
         time_limit=time_limit,

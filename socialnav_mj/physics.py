@@ -1,24 +1,24 @@
 """What is true in the scene: poses, velocities and contacts of robots and people."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
-from dm_control.mujoco import Physics as MujocoPhysics
 from dm_control.mujoco.wrapper import MjData, MjModel
 from dm_control.rl.control import PhysicsError
 from numpy.typing import NDArray
 
-from socialnav_mj.elementary import arccos
 from socialnav_mj.episode import IntArray
-from socialnav_mj.geometry import Array, quaternion_of_yaw, yaw_of_quaternion
-from socialnav_mj.people import PARKING_DEPTH, people_of
-from socialnav_mj.scene import REARM_TIME
-from socialnav_mj.scene_index import first_invalid, index_scene
-from socialnav_mj.touch import Touch, TouchLog
+from socialnav_mj.geometry import Array
+from socialnav_mj.people import people_of
+from socialnav_mj.robots import RobotPool
+from socialnav_mj.scene_index import first_invalid
+from socialnav_mj.touch import Touch
 
 _SLEEP = mujoco.mjtSleepPolicy
 
 
-class Physics(MujocoPhysics):
+class Physics(RobotPool):
     """A crowd of robots and replayed people.
 
     Every body is in a slot, and a slot is either in use or parked below the floor, out of contact. People are moved
@@ -27,34 +27,28 @@ class Physics(MujocoPhysics):
     """
 
     @classmethod
-    def from_mujoco(cls, model: mujoco.MjModel) -> "Physics":
+    def from_mujoco(cls, model: mujoco.MjModel, *, build: Callable[[int], mujoco.MjModel] | None = None) -> "Physics":
         """Physics of a model of `scene.build_model`.
 
         Args:
             model: The compiled scene.
+            build: Compiles the same scene with more robots, for a pool that grows when a slot beyond it is used.
 
         Returns:
             The physics with every slot parked.
         """
         physics = cls(MjData(MjModel(model)))
+        physics._build = build
         with physics.reset_context():
             pass
         return physics
 
     def _reload_from_data(self, data: MjData) -> None:
+        super()._reload_from_data(data)
         model = data.model.ptr
-        self._index = index_scene(model)
-        self._bits = np.array(model.geom_user[:, :2], dtype=np.int32)
         self._people = people_of(self._index, model, data.ptr)
         self._velocity_before = np.zeros(model.nv)
         self._path: tuple[Array | None, Array | None, Array | None] = (None, None, None)
-        self._touches = TouchLog(self._index, rearm_time=float(model.numeric(REARM_TIME).data[0]))
-        super()._reload_from_data(data)
-
-    @property
-    def n_agents(self) -> int:
-        """Robots in the pool."""
-        return self._index.n_agents
 
     @property
     def n_pedestrians(self) -> int:
@@ -70,111 +64,9 @@ class Physics(MujocoPhysics):
         super().reset(keyframe_id)
         self._touches.forget()
         self._path = (None, None, None)
-        for slot in range(self.n_agents):
+        for slot in range(self._index.n_agents):
             self.park_agent(slot)
         self.park_pedestrians(np.arange(self.n_pedestrians))
-
-    # Robots
-
-    def agent_position(self) -> Array:
-        """Floor point under the axle's centre.
-
-        Returns:
-            Shape (n_agents, 2) [m].
-        """
-        return self.data.qpos[self._index.qpos[:, None] + (0, 1)]
-
-    def agent_heading(self) -> Array:
-        """Direction the robots face.
-
-        Returns:
-            Shape (n_agents,) [rad].
-        """
-        return yaw_of_quaternion(self._agent_quaternion())
-
-    def agent_velocity(self) -> Array:
-        """Velocity over ground.
-
-        Returns:
-            Shape (n_agents, 2) [m/s].
-        """
-        return self.data.qvel[self._index.qvel[:, None] + (0, 1)]
-
-    def agent_yaw_rate(self) -> Array:
-        """Angular velocity about the robots' own upward axis.
-
-        Returns:
-            Shape (n_agents,) [rad/s].
-        """
-        return self.data.qvel[self._index.qvel + 5]
-
-    def agent_tilt(self) -> Array:
-        """Angle between the robots' upward axis and the vertical.
-
-        Returns:
-            Shape (n_agents,) [rad].
-        """
-        _, x, y, _ = self._agent_quaternion().T
-        return arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
-
-    def _agent_quaternion(self) -> Array:
-        return self.data.qpos[self._index.qpos[:, None] + (3, 4, 5, 6)]
-
-    def state(self, slots: IntArray) -> Array:
-        """Everything from which the simulation of some robots, and of people who yield, goes on.
-
-        Args:
-            slots: Agent slots, shape (k,).
-
-        Returns:
-            Their rows of `qpos` and `qvel`, then those of the people if they have any, in one row.
-        """
-        index, data = self._index, self.data
-        people = (data.qpos[index.pedestrian_qpos], data.qvel[index.pedestrian_qvel])
-        robots = (data.qpos[index.agent_qpos[slots]], data.qvel[index.agent_dofs[slots]])
-        return np.concatenate([values.ravel() for values in (*robots, *people)])
-
-    def set_twist(self, twist: Array) -> None:
-        """Command the tendon actuators; MuJoCo clips to their ctrlrange.
-
-        Args:
-            twist: (forward speed [m/s], yaw rate [rad/s]), shape (n_agents, 2).
-        """
-        self.data.ctrl[self._index.ctrl] = twist
-
-    def place_agent(self, slot: int, position: Array, heading: float) -> None:
-        """Put a robot at rest on the floor and into contact with the world.
-
-        Args:
-            slot: Agent slot.
-            position: Shape (2,) [m].
-            heading: [rad].
-        """
-        self._set_agent_state(slot, (*position, 0.0), heading, present=True)
-
-    def park_agent(self, slot: int) -> None:
-        """Take a robot out of the scene and end its touches.
-
-        Args:
-            slot: Agent slot.
-        """
-        self._set_agent_state(slot, (2.0 * slot, 0.0, -PARKING_DEPTH), 0.0, present=False)
-        self._touches.end_of_agent(slot)
-
-    def _set_agent_state(self, slot: int, position: tuple[float, ...], heading: float, *, present: bool) -> None:
-        model, data = self.model, self.data
-        address = self._index.qpos[slot]
-        data.qpos[self._index.agent_qpos[slot]] = 0.0
-        data.qpos[address : address + 3] = position
-        data.qpos[address + 3 : address + 7] = quaternion_of_yaw(heading)
-        data.qvel[self._index.agent_dofs[slot]] = 0.0
-        data.qacc_warmstart[self._index.agent_dofs[slot]] = 0.0
-        data.ctrl[self._index.ctrl[slot]] = 0.0
-        model.body_gravcomp[self._index.agent_bodies[slot]] = 0.0 if present else 1.0
-        self._set_contacts(self._index.agent_geoms[slot], present)
-        tree = self._index.agent_tree[slot]
-        # Only who is parked may sleep, since a sleeping robot would not listen to its command; its new place wakes it.
-        model.ptr.tree_sleep_policy[tree] = _SLEEP.mjSLEEP_NEVER if present else _SLEEP.mjSLEEP_ALLOWED
 
     # Pedestrians
 
@@ -239,11 +131,6 @@ class Physics(MujocoPhysics):
             self._set_contacts(self._index.pedestrian_geom[slot : slot + 1], bool(present))
             if not present:
                 self._touches.end_of_pedestrian(int(slot))
-
-    def _set_contacts(self, geoms: IntArray, enabled: bool) -> None:
-        bits = self._bits[geoms] if enabled else np.zeros((len(geoms), 2), dtype=self._bits.dtype)
-        self.model.geom_contype[geoms] = bits[:, 0]
-        self.model.geom_conaffinity[geoms] = bits[:, 1]
 
     # Time
 

@@ -14,6 +14,8 @@ AGENT_PREFIX = "agent_"
 PEDESTRIAN_PREFIX = "pedestrian_"
 REARM_TIME = "contact_rearm_time"
 """Name of the model's number that says how long two bodies must be apart before a touch counts as new [s]."""
+AGENT_SLOTS = "agent_slots"
+"""Name of the model's number of slots for robots; a pool that grows has fewer robots at first."""
 PERSON_MASS = 75.0
 """Of a person who yields: the effective mass behind a lower leg, ISO/TS 15066 table A.3, an adult's [kg]."""
 _TOLERANCE = 1e-6
@@ -44,17 +46,24 @@ def pedestrian_name(slot: int) -> str:
 
 
 def build_model(
-    scenario: Scenario, *, n_agent_slots: int, n_pedestrian_slots: int, low: Array, high: Array
+    scenario: Scenario,
+    *,
+    n_agent_slots: int,
+    n_pedestrian_slots: int,
+    low: Array,
+    high: Array,
+    n_robots: int | None = None,
 ) -> mujoco.MjModel:
     """Compile the arena with a pool of robots and a pool of pedestrians, apart from one another on the floor.
 
     Args:
         scenario: Gives the robot and its limits, kind and radius of people, the physics time step and the re-arm time
             of contacts.
-        n_agent_slots: Robots in the pool, >= 1.
+        n_agent_slots: Robots that can be in the scene at once, >= 1.
         n_pedestrian_slots: People in the pool, >= 1.
         low: Least coordinates of the recorded crowd, shape (2,) [m].
         high: Greatest coordinates, shape (2,) [m].
+        n_robots: Robots in the pool, for the first of the slots; for all of them by default.
 
     Returns:
         The model. Robots are compiled with gravity compensation, so that parked ones need no floor.
@@ -70,7 +79,7 @@ def build_model(
     arena.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     _aim_cameras(arena, low=low, high=high)
 
-    for slot in range(n_agent_slots):
+    for slot in range(n_agent_slots if n_robots is None else n_robots):
         robot = mujoco.MjSpec.from_file(str(_robot_file(scenario.robot, assets)))
         robot.geom("bumper").size[0] = scenario.robot.radius
         robot.actuator("forward").ctrlrange = [0.0, scenario.robot.max_speed]
@@ -92,6 +101,7 @@ def build_model(
     for geom in arena.geoms:
         geom.userdata = [geom.contype, geom.conaffinity]
     arena.add_numeric(name=REARM_TIME, data=[scenario.contact_rearm_time], size=1)
+    arena.add_numeric(name=AGENT_SLOTS, data=[n_agent_slots], size=1)
     model = arena.compile()
     _check_robot(model, scenario.robot)
     return model

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.episode import IntArray
-from socialnav_mj.scene import AGENT_PREFIX, PEDESTRIAN_PREFIX, agent_name, pedestrian_name
+from socialnav_mj.scene import AGENT_PREFIX, AGENT_SLOTS, PEDESTRIAN_PREFIX, agent_name, pedestrian_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,8 +40,10 @@ class SceneIndex:
     """(m, 2) addresses of x and y in `qpos`, from the carrier's place in the model."""
     pedestrian_qvel: IntArray
     """(m, 2) the same in `qvel`."""
+    first_person: int
+    """Number of slots for robots, >= n; whoever is numbered from it on is a person."""
     owner: IntArray
-    """(ngeom,) whose collider a geom is: 0 to n - 1 for bumpers, n to n + m - 1 for people, -1 for all others."""
+    """(ngeom,) whose collider a geom is: 0 to n - 1 for bumpers, from `first_person` on for people, -1 for others."""
 
     @property
     def n_agents(self) -> int:
@@ -87,7 +89,8 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
     bodies = np.array([model.geom(name + "body").id for name in people])
     owner = np.full(model.ngeom, -1, dtype=np.int64)
     owner[bumpers] = np.arange(len(agents))
-    owner[bodies] = len(agents) + np.arange(len(people))
+    first_person = int(model.numeric(AGENT_SLOTS).data[0])
+    owner[bodies] = first_person + np.arange(len(people))
     return SceneIndex(
         qpos=np.array([model.joint(name + "root").qposadr[0] for name in agents], dtype=np.int64),
         qvel=np.array([model.joint(name + "root").dofadr[0] for name in agents], dtype=np.int64),
@@ -102,6 +105,7 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
         pedestrian_carrier=np.array([model.body(name + "carrier").id for name in yielding], dtype=np.int64),
         pedestrian_qpos=_addresses([[model.joint(name + axis).qposadr[0] for axis in "xy"] for name in yielding]),
         pedestrian_qvel=_addresses([[model.joint(name + axis).dofadr[0] for axis in "xy"] for name in yielding]),
+        first_person=first_person,
         owner=owner,
     )
 

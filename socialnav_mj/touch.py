@@ -101,7 +101,7 @@ class TouchLog:
             index: Of the scene.
             rearm_time: Two bodies must have been apart this long before their next touch is a new one [s].
         """
-        self._index, self._rearm_time = index, rearm_time
+        self.index, self._rearm_time = index, rearm_time
         self._wrench = np.zeros(6)
         self.forget()
 
@@ -124,7 +124,7 @@ class TouchLog:
         Args:
             slot: Pedestrian slot.
         """
-        self._open = {pair: touch for pair, touch in self._open.items() if pair[1] != self._index.n_agents + slot}
+        self._open = {pair: touch for pair, touch in self._open.items() if pair[1] != self.index.first_person + slot}
 
     def take_new(self) -> list[Touch]:
         """Touches that began since the last call; they go on growing while the bodies touch.
@@ -155,7 +155,7 @@ class TouchLog:
             people: As they were moved in that step.
             step: Which of theirs it was.
         """
-        pairs = self._index.owner[data.contact.geom]
+        pairs = self.index.owner[data.contact.geom]
         timestep = model.opt.timestep
         forces: dict[tuple[int, int], float] = {}
         pushes: dict[tuple[int, int], Array] = {}
@@ -194,7 +194,7 @@ class TouchLog:
         felt: dict[int, list[Array]] = {}
         for (agent, other), push in pushes.items():
             felt.setdefault(agent, []).append(-push)
-            if other < self._index.n_agents:
+            if other < self.index.first_person:
                 felt.setdefault(other, []).append(push)
         squeeze = {body: squeeze_force(np.array(forces)) for body, forces in felt.items() if len(forces) > 1}
         for pair in pushes:
@@ -213,16 +213,16 @@ class TouchLog:
     ) -> Touch:
         """The touch as far as the robots know it; a pedestrian's heading and velocity are left at 0."""
         agent, other = pair
-        index = self._index
+        index = self.index
         normal = data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
         length = float(np.linalg.norm(normal, axis=-1))
         heading = yaw_of_quaternion(data.qpos[index.qpos[:, None] + (3, 4, 5, 6)])
-        if other < index.n_agents:
+        if other < index.first_person:
             kind, partner = Partner.AGENT, other
             partner_heading = float(heading[partner])
             partner_velocity = before[index.qvel[partner] : index.qvel[partner] + 2].copy()
         else:
-            kind, partner = Partner.PEDESTRIAN, other - index.n_agents
+            kind, partner = Partner.PEDESTRIAN, other - index.first_person
             partner_heading, partner_velocity = 0.0, np.zeros(2)
         return Touch(
             agent=agent,

@@ -10,6 +10,7 @@ from scenes import TINY, busy_crowd, environment_of, stand, walk
 import tasks
 from socialnav_mj.cast import cast_recording
 from socialnav_mj.controllers import GoStraight, PotentialField
+from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.geometry import twist_of_wheel_speed
 from socialnav_mj.metrics import per_agent
@@ -64,19 +65,33 @@ def test_same_run_twice_is_bitwise_the_same_in_new_and_in_used_environments():
 
 
 @pytest.mark.parametrize("pedestrian", ["rigid", "compliant"])
-def test_size_of_the_pool_changes_no_bit_of_an_episode(pedestrian, monkeypatch):
-    small = rollout(busy(pedestrian=pedestrian), PotentialField(), scenario_name="made")
-
-    def with_room(*args):
-        cast = cast_recording(*args)
-        return replace(cast, n_agent_slots=cast.n_agent_slots + 5)
-
-    monkeypatch.setattr("socialnav_mj.task.cast_recording", with_room)
+@pytest.mark.parametrize(("slots", "robots"), [(5, 5), (0, -3)])
+def test_size_of_the_pool_changes_no_bit_of_an_episode(pedestrian, slots, robots, monkeypatch):
+    """A pool that is larger, and one of a single robot that grows while agents and people touch."""
     environment = busy(pedestrian=pedestrian)
-    large = rollout(environment, PotentialField(), scenario_name="made")
-    assert environment.physics.n_agents == environment.task.cast.n_agent_slots > 5
-    assert arrays(large) == arrays(small)
-    assert large.metadata == small.metadata
+    expected, n_agents = rollout(environment, PotentialField(), scenario_name="made"), environment.physics.n_agents
+    assert len(expected.contact_time) and n_agents == 4
+
+    def other(*args):
+        cast = cast_recording(*args)
+        return replace(cast, n_agent_slots=n_agents + slots, n_likely_agents=n_agents + robots)
+
+    monkeypatch.setattr("socialnav_mj.task.cast_recording", other)
+    task = environment.task
+    environment = build_environment(task.recording, task.scenario, grow=True)
+    built = [environment.physics.model.nu // 2]
+    episode = rollout(environment, PotentialField(), scenario_name="made")
+    built.append(environment.physics.model.nu // 2)
+    assert built == [n_agents + robots, n_agents + max(robots, 0)] and environment.physics.n_agents == n_agents + slots
+    assert arrays(episode) == arrays(expected)
+    assert episode.metadata == expected.metadata
+
+
+def test_copy_that_cannot_grow_says_so():
+    task = busy().task
+    physics = build_environment(task.recording, task.scenario, grow=True).physics
+    with pytest.raises(ValueError, match="slot 8 has no robot, and this copy of the physics cannot build one"):
+        physics.copy().place_agent(8, np.zeros(2), 0.0)
 
 
 def test_lonely_robot_goes_straight_to_its_goal():
