@@ -12,21 +12,25 @@ if TYPE_CHECKING:
 
 
 def load(
-    task_name: str, task_kwargs: dict[str, Any] | None = None, environment_kwargs: dict[str, Any] | None = None
+    task_name: str,
+    task_kwargs: dict[str, Any] | None = None,
+    environment_kwargs: dict[str, Any] | None = None,
+    **keywords: Any,
 ) -> control.Environment:
-    """Environment of a scenario; see `tasks.load`.
+    """Environment of a scenario; see `socialnav_mj.suite.load`.
 
     Args:
-        task_name: One of `tasks.ALL_TASKS`.
+        task_name: One of `socialnav_mj.suite.ALL_TASKS`.
         task_kwargs: Keyword arguments of `socialnav_mj.environment.make_environment`.
         environment_kwargs: Keyword arguments of `dm_control.rl.control.Environment`.
+        **keywords: More of `task_kwargs`, such as seed=1.
 
     Returns:
         A dm_control environment.
     """
-    import tasks
+    from socialnav_mj import suite
 
-    return tasks.load(task_name, task_kwargs, environment_kwargs)
+    return suite.load(task_name, task_kwargs, environment_kwargs, **keywords)
 
 
 def _choose_renderer() -> None:

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from dm_control.rl import control
 
-import tasks
+from socialnav_mj import suite
 from socialnav_mj.controllers import Limits, make_controller
 from socialnav_mj.environment import make_environment
 from socialnav_mj.physics import Physics
@@ -67,7 +67,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
     """
     from socialnav_mj.trace.writer import write_trace  # rerun is slow to import and not needed elsewhere
 
-    environment = tasks.load(scenario, {"dataset": recording, "seed": seed})
+    environment = suite.load(scenario, {"dataset": recording, "seed": seed})
     states = _record_states(environment, controller)
     episode_times, physics_times, save_times, trace_times = [], [], [], []
     with tempfile.TemporaryDirectory() as folder:

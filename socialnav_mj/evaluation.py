@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import tasks
+from socialnav_mj import suite
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_config, make_controller
 from socialnav_mj.environment import build_environment
@@ -41,7 +41,7 @@ class Evaluation:
     """Where recordings are looked for first."""
     reading: Reading = DEFAULT_READING
     """How the recording is read, where it does not say so itself."""
-    scenarios: tuple[str, ...] = tasks.ALL_TASKS
+    scenarios: tuple[str, ...] = suite.ALL_TASKS
     """Names of tasks."""
     controllers: tuple[str, ...] = ("potential_field", "go_straight")
     """As `make_controller` takes them; the recorded people are always scored too."""
@@ -53,8 +53,8 @@ class Evaluation:
     """Settings that differ from the scenarios', see `Scenario.changed`."""
 
     def __post_init__(self) -> None:
-        if unknown := [name for name in self.scenarios if name not in tasks.ALL_TASKS]:
-            raise ValueError(f"unknown task {unknown[0]!r}; available: {', '.join(tasks.ALL_TASKS)}")
+        if unknown := [name for name in self.scenarios if name not in suite.ALL_TASKS]:
+            raise ValueError(f"unknown task {unknown[0]!r}; available: {', '.join(suite.ALL_TASKS)}")
         if self.draws < 1:
             raise ValueError(f"draws = {self.draws} is not allowed; allowed: integers >= 1")
         if self.seed < 0:
@@ -84,7 +84,7 @@ class Job:
     @property
     def cost(self) -> float:
         """CPU time that it takes, about [s]: 2.5/4.2/7/9 s in scenarios 1 to 4, half a second for recorded people."""
-        return 0.5 if self.controller == HUMAN else 1.7 + 8.0 * tasks.SHARES[self.scenario]
+        return 0.5 if self.controller == HUMAN else 1.7 + 8.0 * suite.SHARES[self.scenario]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +214,7 @@ def _recording(dataset: str, variant: str | None, data_dir: str | None, reading:
 
 
 def _scenario(evaluation: Evaluation, name: str, draw: int) -> Scenario:
-    return Scenario().changed(**{"share": tasks.SHARES[name], **evaluation.task_kwargs, "seed": draw})
+    return Scenario().changed(**{"share": suite.SHARES[name], **evaluation.task_kwargs, "seed": draw})
 
 
 def _controller_configurations(specs: tuple[str, ...]) -> dict[str, dict[str, Any]]:

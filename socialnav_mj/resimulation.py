@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import tasks
+from socialnav_mj import suite
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_of
 from socialnav_mj.environment import build_environment
@@ -85,7 +85,7 @@ def resimulate(
 
 def _scenario_name(stated: str, scenario: Scenario) -> str:
     """Name of the task with this share of agents; the stated one if there is none, or none is stated."""
-    names = (name for name, share in tasks.SHARES.items() if share == scenario.share)
+    names = (name for name, share in suite.SHARES.items() if share == scenario.share)
     return next(names, stated) if stated else stated
 
 

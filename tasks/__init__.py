@@ -1,96 +1,30 @@
-"""The four scenarios of the paper as a dm_control domain.
+"""The four scenarios of the paper as a dm_control domain: a face of `socialnav_mj.suite`.
 
-`tasks.load("scenario_1")` returns an environment; after `tasks.register_with_dm_control()` so does
-`dm_control.suite.load("socialnav", "scenario_1")`. All keyword arguments of
-`socialnav_mj.environment.make_environment` can be given in `task_kwargs`.
+Nothing of socialnav_mj imports this name, so that a file `tasks.py` in somebody's folder stands in nobody's way.
 """
 
-import inspect
-from typing import Any
+from socialnav_mj.suite import (
+    ALL_TASKS,
+    DOMAIN,
+    SHARES,
+    SUITE,
+    load,
+    register_with_dm_control,
+    scenario_1,
+    scenario_2,
+    scenario_3,
+    scenario_4,
+)
 
-from dm_control.rl import control
-
-# dm_control.utils.containers cannot be the first import of dm_control.
-from dm_control.utils import containers
-
-from socialnav_mj.config import SETTINGS
-from socialnav_mj.environment import make_environment
-
-DOMAIN = "socialnav"
-SUITE = containers.TaggedTasks()
-SHARES = {"scenario_1": 0.1, "scenario_2": 0.3, "scenario_3": 0.7, "scenario_4": 0.9}
-"""Share of the people who are replaced by robots (paper section IV)."""
-
-
-@SUITE.add("benchmarking", "no_reward_visualization")
-def scenario_1(**task_kwargs: Any) -> control.Environment:
-    """10 % of the people are replaced by robots, a few robots in a crowd of people (paper section IV)."""
-    return make_environment(**{"share": SHARES["scenario_1"], **task_kwargs})
-
-
-@SUITE.add("benchmarking", "no_reward_visualization")
-def scenario_2(**task_kwargs: Any) -> control.Environment:
-    """30 % of the people are replaced by robots (paper section IV)."""
-    return make_environment(**{"share": SHARES["scenario_2"], **task_kwargs})
-
-
-@SUITE.add("benchmarking", "no_reward_visualization")
-def scenario_3(**task_kwargs: Any) -> control.Environment:
-    """70 % of the people are replaced by robots (paper section IV)."""
-    return make_environment(**{"share": SHARES["scenario_3"], **task_kwargs})
-
-
-@SUITE.add("benchmarking", "no_reward_visualization")
-def scenario_4(**task_kwargs: Any) -> control.Environment:
-    """90 % of the people are replaced by robots, many robots among a few people (paper section IV)."""
-    return make_environment(**{"share": SHARES["scenario_4"], **task_kwargs})
-
-
-ALL_TASKS: tuple[str, ...] = tuple(SUITE)
-
-
-def load(
-    task_name: str,
-    task_kwargs: dict[str, Any] | None = None,
-    environment_kwargs: dict[str, Any] | None = None,
-    visualize_reward: bool = False,
-) -> control.Environment:
-    """Environment of a scenario.
-
-    Args:
-        task_name: One of `ALL_TASKS`.
-        task_kwargs: Keyword arguments of `socialnav_mj.environment.make_environment`.
-        environment_kwargs: Keyword arguments of `dm_control.rl.control.Environment`.
-        visualize_reward: As in `dm_control.suite.load`; these tasks colour nothing by reward.
-
-    Returns:
-        A dm_control environment.
-
-    Raises:
-        ValueError: If the task or a keyword is unknown, or a value not allowed.
-    """
-    if task_name not in SUITE:
-        raise ValueError(f"unknown task {task_name!r}; available: {', '.join(ALL_TASKS)}")
-    own = inspect.signature(make_environment).parameters.values()
-    allowed = [parameter.name for parameter in own if parameter.kind is not parameter.VAR_KEYWORD]
-    allowed = [*SETTINGS, *(name for name in allowed if name != "environment_kwargs")]
-    if unknown := sorted(set(task_kwargs or {}) - set(allowed)):
-        raise ValueError(f"unknown task_kwargs {', '.join(unknown)}; available: {', '.join(allowed)}")
-    environment = SUITE[task_name](**(task_kwargs or {}), environment_kwargs=environment_kwargs)
-    environment.task.visualize_reward = visualize_reward
-    return environment
-
-
-def register_with_dm_control() -> None:
-    """Make `dm_control.suite.load("socialnav", ...)` find these tasks."""
-    import sys
-
-    from dm_control import suite
-
-    domain = sys.modules[__name__]
-    suite._DOMAINS[DOMAIN] = domain
-    suite.TASKS_BY_DOMAIN[DOMAIN] = ALL_TASKS
-    missing = tuple((DOMAIN, name) for name in ALL_TASKS if (DOMAIN, name) not in suite.ALL_TASKS)
-    suite.ALL_TASKS += missing
-    suite.BENCHMARKING += missing
-    suite.NO_REWARD_VIZ += missing
+__all__ = [
+    "ALL_TASKS",
+    "DOMAIN",
+    "SHARES",
+    "SUITE",
+    "load",
+    "register_with_dm_control",
+    "scenario_1",
+    "scenario_2",
+    "scenario_3",
+    "scenario_4",
+]

@@ -35,6 +35,7 @@ ROWS = (
         "task",
         "environment",
     },
+    {"suite"},
     {"tasks"},
     {"controllers"},
     {"recorder", "rollout", "human", "evaluation"},
@@ -45,14 +46,14 @@ ROWS = (
     {"studies"},
     {"studies.paper", "studies.leave_one_out"},
     {"studies.gains", "studies.leaderboard"},
-    {"benchmark", "resimulation", "verification", "cli"},
+    {"benchmark", "resimulation", "verification", "cli", "__main__"},
 )
 # A study uses what all studies share, and no other study.
 STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}
 # Controllers own no simulator: most rows above are closed to them.
 CONTROLLERS_MAY_IMPORT = {"resources", "elementary", "geometry", "config", "observation", "features", "controllers"}
-# `socialnav_mj.load` imports `tasks` when it is called.
-EXCEPTIONS = {("socialnav_mj", "tasks")}
+# `socialnav_mj.load` imports the suite when it is called.
+EXCEPTIONS = {("socialnav_mj", "suite")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name
 # dm_control's Environment in their signatures, `benchmark` times bare mj_step calls, `cli` reports PhysicsError.
 ONLY_IN = {
@@ -66,7 +67,7 @@ ONLY_IN = {
         "physics",
         "task",
         "environment",
-        "tasks",
+        "suite",
         "benchmark",
     },
     "dm_control": {
@@ -75,7 +76,7 @@ ONLY_IN = {
         "physics",
         "task",
         "environment",
-        "tasks",
+        "suite",
         "rollout",
         "benchmark",
         "cli",
@@ -196,6 +197,16 @@ def test_imports_only_point_upwards():
             if closed or row.get(other, -1) > row.get(room, -1):
                 wrong.append(f"{path.relative_to(ROOT)}:{line} {room} imports {other}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_nothing_imports_the_top_level_tasks_which_a_users_file_may_shadow():
+    found = [
+        f"{path}:{line}"
+        for module, path, tree in sources()
+        for line, name in imported_modules(tree, module, path)
+        if name.split(".")[0] == "tasks"
+    ]
+    assert not found, found
 
 
 def test_heavy_libraries_stay_in_their_rooms():

@@ -13,6 +13,7 @@ import time
 from contextlib import suppress
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -298,6 +299,11 @@ def test_killed_command_leaves_no_process_and_no_file_changes_any_more():
     left = {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()}
     time.sleep(1.0)
     assert {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()} == left
+
+
+def test_version_is_that_of_the_package(capsys):
+    main(["--version"])
+    assert capsys.readouterr().out == f"socialnav-mj {version('socialnav-mj')}\n"
 
 
 # list, data, bench

@@ -1,6 +1,9 @@
 """Every task keeps dm_env's and dm_control's conventions."""
 
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -323,3 +326,20 @@ def test_viewer_runs_the_tasks_without_a_policy_and_with_one(environment: contro
         running.tick(0.0, paused=True)
         assert environment.task.step >= 2
         running.stop()
+
+
+def test_keywords_of_load_reach_the_task() -> None:
+    assert socialnav_mj.load("scenario_1", seed=5, dataset=TINY).task.scenario.seed == 5
+    assert tasks.load("scenario_2", {"dataset": TINY}, seed=3).task.scenario.seed == 3
+    with pytest.raises(ValueError, match="unknown task_kwargs sed; available: share, seed"):
+        socialnav_mj.load("scenario_1", sed=5)
+    with pytest.raises(ValueError, match="seed given twice, in task_kwargs and as a keyword"):
+        socialnav_mj.load("scenario_1", {"seed": 1}, seed=2)
+
+
+def test_a_file_tasks_py_beside_the_user_is_not_taken_for_ours(tmp_path: Path) -> None:
+    (tmp_path / "tasks.py").write_text("raise ImportError('the user's own')\n")
+    code = f"import socialnav_mj; print(socialnav_mj.load('scenario_1', dataset={str(TINY)!r}).task.scenario.share)"
+    for command in (["-c", code], ["-m", "socialnav_mj", "list"]):
+        result = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert result.returncode == 0 and ("0.1" in result.stdout or "scenario_1" in result.stdout), result.stderr

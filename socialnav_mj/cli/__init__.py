@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -43,10 +44,13 @@ def main(args: list[str] | None = None) -> None:
     Args:
         args: Command line without the program's name; sys.argv by default.
     """
+    if (sys.argv[1:] if args is None else args) == ["--version"]:
+        say(f"socialnav-mj {version('socialnav-mj')}")
+        return
     command = tyro.cli(
         Command,
         prog="socialnav-mj",
-        description="Social navigation in recorded crowds, as a MuJoCo physics benchmark.",
+        description="Social navigation in recorded crowds, as a MuJoCo physics benchmark. --version tells the version.",
         args=args,
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
     )

@@ -18,13 +18,13 @@ class List:
 
     def run(self) -> None:
         """Print a table each of tasks, controllers and recordings."""
-        import tasks
+        from socialnav_mj import suite
         from socialnav_mj.controllers import available
         from socialnav_mj.recordings.catalogue import catalogue
 
         table = Table("task", "replaced", title="tasks", title_justify="left")
-        for name in tasks.ALL_TASKS:
-            table.add_row(name, f"{tasks.SHARES[name]:.0%}")
+        for name in suite.ALL_TASKS:
+            table.add_row(name, f"{suite.SHARES[name]:.0%}")
         console.print(table)
         table = Table("controller", title="controllers", title_justify="left")
         for name in available():

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import tasks
+from socialnav_mj import suite
 from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
 from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.studies.panel import Entry
@@ -29,7 +29,7 @@ class Study(ABC):
     """Trained policies, as `load_policy` takes them."""
     data_dir: str | None = None
     """Where recordings are looked for first."""
-    scenarios: tuple[str, ...] = tasks.ALL_TASKS
+    scenarios: tuple[str, ...] = suite.ALL_TASKS
     draws: int = 10
     seed: int = 0
     """Of the first draw."""
