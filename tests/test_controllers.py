@@ -285,6 +285,11 @@ class Outside:
         return np.full((len(observation["active"]), 2), self.level)
 
 
+class Forgetful(Outside):
+    def __init__(self, margin=1.0):
+        super().__init__()
+
+
 class Nameless:
     def act(self, observation):
         return None
@@ -330,8 +335,11 @@ def test_make_controller_takes_entry_points_of_installed_packages(monkeypatch):
         (f"{__name__}:Missing", "has no attribute 'Missing'"),
         (":Thing", "expected package.module:Class"),
         (f"{__name__}:LIMITS", "is a Limits; expected a class"),
-        (f"{__name__}:Nameless", "lacks name, reset or act"),
-        ("potential_field(gain=1)", "unexpected keyword argument 'gain'"),
+        (f"{__name__}:Nameless", "is a Nameless, which lacks name and reset"),
+        ("potential_field(gain=1)", "has no setting 'gain'; its settings: position_gain="),
+        ("hybrid(neer=1)", "its settings: near='replay_irl', far='potential_field', switch_distance=2.0"),
+        (f"{__name__.replace(':', '.')}.Outside", f"did you mean {__name__}:Outside?"),
+        (f"{__name__}:Forgetful(margin=2)", "was given margin = 2 but does not keep it"),
         ("potential_field(influence_distance=-1)", "influence_distance = -1 is not allowed"),
         ("potential_field(position_gain=x)", "cannot be read; expected name or name(key=value, ...)"),
         ("potential_field(1)", "cannot be read"),
@@ -350,7 +358,8 @@ def test_controller_config_holds_the_class_and_the_fields_as_json_values():
     config = controller_config(PotentialField(attraction_limit=None))
     assert config.pop("class") == "socialnav_mj.controllers.potential_field:PotentialField"
     assert config["attraction_limit"] is None and config["repulsion_gain"] == 2.0 and len(config) == 6
-    assert controller_config(Outside()) == {"class": f"{__name__}:Outside"}
+    outside = controller_config(Outside(level=0.25))
+    assert (outside.pop("class"), outside.pop("level")) == (f"{__name__}:Outside", 0.25) and set(outside) == {"sources"}
     assert controller_config(Odd(knob=(1, 2)))["knob"] == [1, 2]
     for knob in (np.zeros(2), math.inf, {1, 2}):
         with pytest.raises(ValueError, match=r"Odd\.knob = .* is not allowed; allowed: JSON values"):

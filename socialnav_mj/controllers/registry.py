@@ -1,8 +1,10 @@
 """Controllers by name: the built-in ones, those of installed packages, and any class by its path."""
 
 import ast
+import inspect
+import re
 from collections.abc import Callable
-from dataclasses import Field, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
 from operator import attrgetter
@@ -12,6 +14,7 @@ from socialnav_mj.controllers.base import IS_CONTROLLER, Controller
 from socialnav_mj.controllers.dynamic_window import DynamicWindow
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
+from socialnav_mj.controllers.identity import json_value, parameters_of
 from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.mpdm import MPDM
 from socialnav_mj.controllers.orca import ORCA
@@ -55,26 +58,54 @@ def make_controller(spec: str) -> Controller:
     Args:
         spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class";
             keyword arguments of literals may follow, as in "potential_field(repulsion_gain=3.0)". With them a
-            dataclass with a field `name` is named by the whole spec, so that two configurations can stand in one
-            table.
+            controller is named by the whole spec, so that two configurations can stand in one table; "fast=orca" and
+            "fast=orca(margin=0.1)" name it "fast".
 
     Returns:
         A new controller, not yet reset.
 
     Raises:
-        ValueError: If there is no such controller, or it does not take the configuration.
+        ValueError: If there is no such controller, or it does not take the configuration, or does not keep it where
+            an episode could say it.
     """
-    name, config = parse(spec)
+    label, plain = split_label(spec)
+    name, config = parse(plain)
     factory = factory_of(name)
-    if config and "name" in {field.name for field in settings_of(factory)}:
+    allowed = parameters_of(factory)
+    if unknown := [key for key in config if allowed is not None and key not in {*allowed, "name"}]:
+        raise ValueError(
+            f"controller {name!r} has no setting {unknown[0]!r}; its settings: {described_settings(factory) or 'none'}"
+        )
+    if label is not None:
+        config["name"] = label
+    elif config:
         config.setdefault("name", spec)
     try:
         controller = made(factory, config)
     except TypeError as error:
         raise ValueError(f"controller {name!r} cannot be made with {config or 'no arguments'}: {error}") from error
-    if not isinstance(controller, Controller):
-        raise ValueError(f"controller {name!r} is a {type(controller).__name__}, which lacks name, reset or act")
+    if lacking := lacks(controller):
+        raise ValueError(f"controller {name!r} is a {type(controller).__name__}, which lacks {lacking}")
+    for key in config if not (is_dataclass(controller) or hasattr(controller, "config")) else ():
+        if not hasattr(controller, key) or json_value(getattr(controller, key)) != json_value(config[key]):
+            raise ValueError(
+                f"controller {name!r} was given {key} = {config[key]!r} but does not keep it, so that no episode could "
+                f"say what was run; expected an attribute {key!r} of that value, or a method config that returns the "
+                "keyword arguments that make it"
+            )
     return controller
+
+
+def lacks(controller: object) -> str:
+    """What an object lacks to be a controller.
+
+    Args:
+        controller: Anything.
+
+    Returns:
+        Names of the missing members, such as "reset and act"; empty for a controller.
+    """
+    return " and ".join(name for name in ("name", "reset", "act") if not hasattr(controller, name))
 
 
 def made(kind: Callable[..., Controller], settings: dict[str, Any]) -> Controller:
@@ -82,21 +113,44 @@ def made(kind: Callable[..., Controller], settings: dict[str, Any]) -> Controlle
 
     Args:
         kind: Class or function that makes it.
-        settings: Keyword arguments; where a field holds a controller, its spec; where it holds several, theirs.
+        settings: Keyword arguments; where a field holds a controller, its spec; where it holds several, theirs. A name
+            that the class does not take is set afterwards.
 
     Returns:
         A new controller, not yet reset.
 
     Raises:
         TypeError: If the class does not take the settings.
-        ValueError: If a value is not allowed.
+        ValueError: If a value is not allowed, or the name cannot be set.
     """
     parts = {name: _part(settings[name]) for name in parts_of(kind) if name in settings}
-    return kind(**settings | parts)
+    arguments = settings | parts
+    if "name" not in arguments or "name" in (parameters_of(kind) or ("name",)):
+        return kind(**arguments)
+    name = arguments.pop("name")
+    controller = kind(**arguments)
+    try:
+        controller.name = name
+    except AttributeError as error:
+        raise ValueError(f"controller {controller.name!r} cannot be named {name!r}: {error}") from error
+    return controller
 
 
 def _part(spec: str | list[str] | tuple[str, ...]) -> Controller | tuple[Controller, ...]:
     return tuple(make_controller(one) for one in spec) if isinstance(spec, list | tuple) else make_controller(spec)
+
+
+def split_label(spec: str) -> tuple[str | None, str]:
+    """The name that a spec gives its controller, and the rest of the spec.
+
+    Args:
+        spec: As `make_controller` takes it.
+
+    Returns:
+        "fast", "orca(margin=0.1)" of "fast=orca(margin=0.1)"; None and the spec if it gives no name.
+    """
+    found = re.fullmatch(r"([^=(:]+)=(.+)", spec, re.DOTALL) if isinstance(spec, str) else None
+    return (found[1].strip(), found[2].strip()) if found else (None, spec)
 
 
 def parse(spec: str) -> tuple[str, dict[str, Any]]:
@@ -147,7 +201,11 @@ def factory_of(name: str) -> Callable[..., Controller]:
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         if entry.name == name:
             return load(name, entry.value)
-    raise ValueError(f"unknown controller {name!r}; available: {', '.join(available())}, or package.module:Class")
+    module, dot, attribute = name.rpartition(".")
+    meant = f"; did you mean {module}:{attribute}?" if dot else ""
+    raise ValueError(
+        f"unknown controller {name!r}; available: {', '.join(available())}, or package.module:Class{meant}"
+    )
 
 
 def load(name: str, path: str) -> Callable[..., Controller]:
@@ -209,3 +267,24 @@ def parts_of(kind: Callable[..., Controller]) -> tuple[str, ...]:
         Names of the fields that are marked with `IS_CONTROLLER`.
     """
     return tuple(field.name for field in settings_of(kind) if field.metadata.get(IS_CONTROLLER))
+
+
+def described_settings(factory: Callable[..., Controller]) -> str:
+    """The settings of a controller with their defaults.
+
+    Args:
+        factory: What `factory_of` returns.
+
+    Returns:
+        Such as "margin=0.1, horizon=3.0"; a setting without a default as its name alone, and parts by their names.
+    """
+    own = {field.name: field for field in settings_of(factory)}
+    shown = []
+    for name, default in (parameters_of(factory) or {}).items():
+        field = own.get(name)
+        if field is not None and field.default_factory is not MISSING:
+            part = field.default_factory()
+            default = [p.name for p in part] if isinstance(part, tuple) else getattr(part, "name", part)
+        if name != "name":
+            shown.append(name if default is inspect.Parameter.empty else f"{name}={default!r}")
+    return ", ".join(shown)

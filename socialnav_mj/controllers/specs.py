@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Collection
+from dataclasses import is_dataclass
 from functools import partial
 from importlib.metadata import entry_points
 from typing import Any, get_type_hints
@@ -9,6 +10,7 @@ from typing import Any, get_type_hints
 from typeguard import TypeCheckError, check_type
 
 from socialnav_mj.controllers.base import Controller
+from socialnav_mj.controllers.identity import files_of, is_json, json_value, parameters_of, sources_of
 from socialnav_mj.controllers.registry import (
     BUILT_IN,
     ENTRY_POINT_GROUP,
@@ -19,6 +21,7 @@ from socialnav_mj.controllers.registry import (
     parse,
     parts_of,
     settings_of,
+    split_label,
 )
 from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, policy_of
 
@@ -38,7 +41,8 @@ def with_policy_of(spec: str, dataset: str) -> str:
         ValueError: If the spec cannot be read.
     """
     policy = policy_of(dataset)
-    name, config = parse(spec)
+    label, plain = split_label(spec)
+    name, config = parse(plain)
     found: dict[str, Any] = {}
     if name == "replay_irl" and "policy" not in config and policy != DEFAULT_POLICY:
         found = {"policy": policy}
@@ -49,32 +53,67 @@ def with_policy_of(spec: str, dataset: str) -> str:
         found = {part: new for part, new in own.items() if new != parts[part]}
     if not found:
         return spec
-    return _text(name, config | found)
+    return ("" if label is None else f"{label}=") + _text(name, config | found)
+
+
+_BESIDE = ("class", "attributes", "sources")
+"""Keys of a controller's configuration that are no settings."""
 
 
 def controller_config(controller: Controller) -> dict[str, Any]:
-    """Configuration of a controller as it travels in every episode.
+    """Configuration of a controller as it travels in every episode: what tells it from what it was before an edit.
 
     Args:
-        controller: A dataclass, whose fields are its settings, or an object of any other class.
+        controller: As it was made: `reset` may add to its attributes.
 
     Returns:
-        The fields of a dataclass, and the class; for others the class alone. JSON values, as they are read back;
-        controllers that it is made of by their specs.
+        JSON values, as they are read back. "class"; its settings: the fields of a dataclass, what a method `config`
+        returns, or the attributes that are named like arguments of its class, controllers that it is made of by their
+        specs; "attributes": other public attributes, if there are any; "sources": digests of the files that its
+        author wrote and its settings name, also of its parts, if there are any.
 
     Raises:
-        ValueError: If a field is no JSON value.
+        ValueError: If a setting is no JSON value.
     """
     kind = type(controller)
-    result: dict[str, Any] = {"class": class_path(kind)}
-    for name in (field.name for field in settings_of(kind)):
-        value = getattr(controller, name)
+    path = class_path(kind)
+    sources = {f"{path} in {name}": digest for name, digest in sources_of(kind).items()}
+    settings: dict[str, Any] = {}
+    for name, value in _settings(controller).items():
         try:
             is_part = name in parts_of(kind)
-            result[name] = _each(value, spec_of) if is_part else json.loads(json.dumps(value, allow_nan=False))
+            settings[name] = _each(value, spec_of) if is_part else json.loads(json.dumps(value, allow_nan=False))
         except (TypeError, ValueError) as error:
-            raise ValueError(f"{result['class']}.{name} = {value!r} is not allowed; allowed: JSON values") from error
-    return result
+            raise ValueError(f"{path}.{name} = {value!r} is not allowed; allowed: JSON values") from error
+        for part in (value if isinstance(value, list | tuple) else (value,)) if is_part else ():
+            sources |= controller_config(part).get("sources", {})
+    sources |= files_of(settings)
+    attributes = {
+        name: json_value(value)
+        for name, value in sorted(getattr(controller, "__dict__", {}).items())
+        if not (name.startswith("_") or name in settings) and (name == "name" or not is_dataclass(kind))
+    }
+    beside = {"attributes": attributes, "sources": sources}
+    return {"class": path, **settings, **{name: value for name, value in beside.items() if value}}
+
+
+def _settings(controller: Controller) -> dict[str, Any]:
+    """What makes the same controller again: keyword arguments of its class."""
+    kind = type(controller)
+    if is_dataclass(kind):
+        return {field.name: getattr(controller, field.name) for field in settings_of(kind)}
+    config = getattr(controller, "config", None)
+    if callable(config):
+        found = config()
+        if not isinstance(found, dict) or any(not isinstance(key, str) or key in _BESIDE for key in found):
+            raise ValueError(
+                f"{class_path(kind)}.config() returns {found!r}; expected a dictionary of keyword arguments of its "
+                f"class, none of them named {', '.join(_BESIDE)}"
+            )
+        return found
+    named = {name: getattr(controller, name) for name in parameters_of(kind) or () if hasattr(controller, name)}
+    # What is no JSON value cannot make it again; it is told as an attribute.
+    return {name: json_value(value) for name, value in named.items() if is_json(value)}
 
 
 def spec_of(controller: Controller) -> str:
@@ -95,10 +134,12 @@ def spec_of(controller: Controller) -> str:
     names += [entry.name for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.value == class_path(kind)]
     names.append(class_path(kind))
     wanted = controller_config(controller)
-    own_name = wanted.get("name")
-    if isinstance(own_name, str) and _is_made_by(own_name, names, wanted, kind):
-        return own_name
-    settings = {name: value for name, value in wanted.items() if name != "class"}
+    settings = {name: value for name, value in wanted.items() if name not in _BESIDE}
+    own_name = settings.get("name", wanted.get("attributes", {}).get("name"))
+    if isinstance(own_name, str):
+        if _is_made_by(own_name, names, wanted, kind):
+            return own_name
+        settings["name"] = own_name
     for name in settings.copy():
         fewer = {key: value for key, value in settings.items() if key != name}
         # With settings, a spec without a name would be the name.
@@ -146,10 +187,14 @@ def controller_of(config: dict[str, Any], *, trusted: Collection[str] = ()) -> C
     """
     if not isinstance(config, dict) or not isinstance(config.get("class"), str):
         raise ValueError(f'controller_config = {config!r} is not allowed; allowed: a JSON object with "class"')
-    values = dict(config)
-    path = values.pop("class")
+    path = config["class"]
+    values = {name: value for name, value in config.items() if name not in _BESIDE}
     kind = _known_class(path, trusted)
     _check_values(path, kind, values, trusted)
+    attributes = config.get("attributes")
+    name = attributes.get("name") if isinstance(attributes, dict) else None
+    if isinstance(name, str):
+        values["name"] = name
     try:
         return made(kind, values)
     except TypeError as error:
@@ -172,14 +217,16 @@ def _known_class(path: str, trusted: Collection[str]) -> Callable[..., Controlle
 
 def _check_values(path: str, kind: Callable[..., Controller], values: dict[str, Any], trusted: Collection[str]) -> None:
     """Settings that a file gives are those that the class has, of their types, and name nothing untrusted either."""
-    allowed = {field.name: field for field in settings_of(kind)}
-    hints = get_type_hints(kind) if allowed else {}
+    fields = [field.name for field in settings_of(kind)]
+    parameters = parameters_of(kind)
+    allowed = fields or parameters
+    hints = get_type_hints(kind if fields else kind.__init__)
     for name, value in values.items():
-        if name not in allowed:
+        if allowed is not None and name not in allowed:
             known = ", ".join(allowed) or "none"
             raise ValueError(f"controller {path!r} has no setting {name!r}; allowed: {known}")
         try:
-            check_type(value, str | list[str] if name in parts_of(kind) else hints[name])
+            check_type(value, str | list[str] if name in parts_of(kind) else hints.get(name, Any))
         except TypeCheckError as error:
             raise ValueError(f"controller {path!r}: {name} = {value!r} is not allowed: {error}") from error
         if name in parts_of(kind):
@@ -187,7 +234,7 @@ def _check_values(path: str, kind: Callable[..., Controller], values: dict[str, 
 
 
 def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
-    name, config = parse(spec)
+    name, config = parse(split_label(spec)[1])
     if ":" in name and name not in trusted:
         raise ValueError(_untrusted(name))
     factory = factory_of(name)
