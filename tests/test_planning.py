@@ -10,11 +10,12 @@ from test_protocol import Walks, actions
 from test_robot import World
 
 from socialnav_mj.controllers import Limits, controller_config, controller_of, make_controller
-from socialnav_mj.controllers.mpc import MPC, PRESETS, WEIGHTS
+from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.planning import loops
-from socialnav_mj.controllers.planning.arrays import plan_costs
+from socialnav_mj.controllers.planning.arrays import NOT_WANTED, plan_costs
 from socialnav_mj.controllers.planning.entrances import Entrances
 from socialnav_mj.controllers.planning.foresight import MOST_NEIGHBOURS, Foresight
+from socialnav_mj.controllers.planning.planner import PRESETS, WEIGHTS
 from socialnav_mj.controllers.planning.search import KEPT, SAMPLES, library, search
 from socialnav_mj.controllers.planning.terms import Crowd, terms_of
 from socialnav_mj.controllers.planning.tracks import Tracks
@@ -158,10 +159,10 @@ def test_compiled_loops_give_the_bits_of_the_arrays(seed):
     pytest.importorskip("numba")
     problem = random_problem(seed)
     expected = plan_costs(*problem)
-    everything = loops.compiled()(*problem, np.full(problem[0].shape[:2], np.inf))
+    everything = loops.compiled()(*problem, np.full(problem[0].shape[:2], np.inf), 0.0, NOT_WANTED)
     np.testing.assert_array_equal(everything, expected)
     best = np.full((6, 3), np.inf)
-    some, clearance = loops.compiled()(*problem, best)
+    some, clearance = loops.compiled()(*problem, best, 0.0, NOT_WANTED)
     np.testing.assert_array_equal(best, np.sort(expected[0], axis=1)[:, :3])
     given_up = np.isinf(some)
     assert given_up.mean() > 0.3 and (np.isinf(clearance) == given_up).all()
@@ -171,7 +172,7 @@ def test_compiled_loops_give_the_bits_of_the_arrays(seed):
 
 def test_loops_are_right_without_the_compiler_too():
     problem = random_problem(7, n=2, k=3, p=4)
-    found = loops.loop_costs(*problem, np.full((2, 4), np.inf))
+    found = loops.loop_costs(*problem, np.full((2, 4), np.inf), 0.0, NOT_WANTED)
     np.testing.assert_array_equal(found, plan_costs(*problem))
 
 
@@ -179,7 +180,7 @@ def test_wheel_speeds_are_the_same_bits_with_and_without_numba(monkeypatch):
     pytest.importorskip("numba")
     walks = Walks.made(5, n=8, m=12)
     fast = actions("mpc", walks)
-    monkeypatch.setattr("socialnav_mj.controllers.mpc.compiled", lambda: None)
+    monkeypatch.setattr("socialnav_mj.controllers.planning.arrays.compiled", lambda: None)
     np.testing.assert_array_equal(actions("mpc", walks), fast)
 
 

@@ -17,6 +17,7 @@ from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.identity import json_value, parameters_of
 from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.mpdm import MPDM
+from socialnav_mj.controllers.mppi import MPPI
 from socialnav_mj.controllers.orca import ORCA
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
@@ -39,6 +40,7 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "selector": Selector,
     "stand_still": StandStill,
     "mpc": MPC,
+    "mppi": MPPI,
 }
 
 

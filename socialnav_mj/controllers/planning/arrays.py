@@ -6,6 +6,7 @@ from socialnav_mj.controllers.planning.loops import (
     at_entrance,
     bearing,
     closest,
+    compiled,
     inside,
     lacking,
     sine_cosine,
@@ -17,29 +18,76 @@ from socialnav_mj.controllers.planning.loops import (
 from socialnav_mj.controllers.planning.terms import Crowd, Terms
 from socialnav_mj.geometry import Array
 
+NOT_WANTED: Array = np.empty((0, 0, 0, 0))
+"""For `states`, of whoever asks for costs alone."""
+
+
+def costs_of(
+    plans: Array,
+    speed: Array,
+    yaw_rate: Array,
+    goal: Array,
+    crowd: Crowd,
+    terms: Terms,
+    best: Array,
+    slack: float = 0.0,
+    states: Array = NOT_WANTED,
+) -> tuple[Array, Array]:
+    """Costs by the compiled loops if there are any, else by arrays.
+
+    Args:
+        plans: As `plan_costs` takes them.
+        speed: The same.
+        yaw_rate: The same.
+        goal: The same.
+        crowd: The same.
+        terms: The same.
+        best: (n, b) least costs so far, as `loops.loop_costs` takes them; it may be changed.
+        slack: Plans that cost more than this above the greatest of `best` may be given up [s].
+        states: As `plan_costs` fills them.
+
+    Returns:
+        Cost, and the part of it that is for clearance, both (n, p), infinite for plans that were given up [s].
+    """
+    loops = compiled()
+    if loops is None:
+        return plan_costs(plans, speed, yaw_rate, goal, crowd, terms, states)
+    return loops(plans, speed, yaw_rate, goal, crowd, terms, best, slack, states)
+
 
 def plan_costs(
-    plans: Array, speed: Array, yaw_rate: Array, goal: Array, crowd: Crowd, terms: Terms
+    plans: Array,
+    speed: Array,
+    yaw_rate: Array,
+    goal: Array,
+    crowd: Crowd,
+    terms: Terms,
+    states: Array = NOT_WANTED,
 ) -> tuple[Array, Array]:
     """Cost of each plan of each agent, rolled out in the agent's frame.
 
-    A plan heads for psi_1 at speed v_1 until t_1, then for the goal's bearing plus psi_2 at v_2. Its cost is the time
+    A plan of five numbers heads for psi_1 at speed v_1 until t_1, then for the goal's bearing plus psi_2 at v_2; one of
+    two numbers a step commands these speeds and yaw rates. Its cost is the time
     to the goal, or the horizon with what is left of the way at full speed and a little for not facing the goal; half
     the sum and half the maximum, over others, of the worst lack of clearance; the time that each person is in the
     zone, and the time where somebody may appear.
 
     Args:
-        plans: (n, p, 5) psi_1 [rad], v_1 [m/s], t_1 [s], psi_2 [rad], v_2 [m/s].
+        plans: (n, p, 5) psi_1 [rad], v_1 [m/s], t_1 [s], psi_2 [rad], v_2 [m/s]; or (n, p, 2 x steps) speed [m/s] and
+            yaw rate [rad/s] of the first step, of the second, and so on.
         speed: (n,) measured [m/s].
         yaw_rate: (n,) measured [rad/s].
         goal: (n, 2) [m].
         crowd: Around each agent, for as many steps as there are terms.
         terms: Limits, motion and shapes of the costs.
+        states: (n, p, steps, 6) filled with place [m], cosine and sine of the heading, speed [m/s] and yaw rate [rad/s]
+            at the end of each step, NaN after the arrival; or `NOT_WANTED`.
 
     Returns:
         Cost, and the part of it that is for clearance, both (n, p) [s].
     """
-    psi_1, v_1, t_1, psi_2, v_2 = np.moveaxis(plans, 2, 0)
+    sequence = plans.shape[2] != 5
+    psi_1, v_1, t_1, psi_2, v_2 = np.moveaxis(plans[..., :5], 2, 0)
     first_y, first_x = sine_cosine(psi_1)
     offset_y, offset_x = sine_cosine(psi_2)
     shape = psi_1.shape
@@ -54,10 +102,10 @@ def plan_costs(
         head_x = np.where(first, first_x, offset_x * to_x - offset_y * to_y)
         head_y = np.where(first, first_y, offset_x * to_y + offset_y * to_x)
         error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
-        command = yaw_command(error, terms)
+        command = plans[..., 2 * k + 1] if sequence else yaw_command(error, terms)
         half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(command, w, terms))
         w = command
-        gained = speed_gained(np.where(first, v_1, v_2), v, terms)
+        gained = speed_gained(plans[..., 2 * k] if sequence else np.where(first, v_1, v_2), v, terms)
         way = (v + terms.mean_speed * gained) * terms.step
         v = v + gained
         cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine
@@ -78,6 +126,9 @@ def plan_costs(
             weighted = weighted + crowd.entrance_weight[:, e, None] * there
         within = np.where(under_way, within + weighted * terms.zone_time[k], within)
         x, y = next_x, next_y
+        if states.size:
+            now = np.stack([x, y, cosine, sine, v, w], axis=-1)
+            states[:, :, k] = np.where(under_way[..., None], now, np.nan)
         to_x, to_y = goal[:, :1] - x, goal[:, 1:] - y
         time = np.where(under_way, (k + 1) * terms.step, time)
         remaining = np.where(under_way, np.sqrt(to_x * to_x + to_y * to_y), remaining)

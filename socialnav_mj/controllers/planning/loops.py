@@ -105,7 +105,15 @@ def at_entrance(x: Any, y: Any, terms: Terms) -> Any:
 
 
 def loop_costs(
-    plans: Array, speed: Array, yaw_rate: Array, goal: Array, crowd: Crowd, terms: Terms, best: Array
+    plans: Array,
+    speed: Array,
+    yaw_rate: Array,
+    goal: Array,
+    crowd: Crowd,
+    terms: Terms,
+    best: Array,
+    slack: float,
+    states: Array,
 ) -> tuple[Array, Array]:
     """What `arrays.plan_costs` returns, number by number; to be called as `compiled` returns it.
 
@@ -120,12 +128,15 @@ def loop_costs(
         crowd: As there.
         terms: As there.
         best: (n, b) least costs of each agent so far, ascending, infinite if there are fewer; brought up to date.
+        slack: A plan is given up when it must cost more than this above the greatest of `best` [s].
+        states: As there.
 
     Returns:
         As there; both are infinite for plans that were given up.
     """
     n, p, _ = plans.shape
     steps, others, entrances = len(terms.margin), crowd.contact.shape[1], crowd.entrance_x.shape[1]
+    sequence = plans.shape[2] != 5
     square = terms.entrance_radius * terms.entrance_radius
     costs, clearances = np.full((n, p), np.inf), np.full((n, p), np.inf)
     near, count = np.empty((steps, others), dtype=np.int64), np.empty(steps, dtype=np.int64)
@@ -161,8 +172,11 @@ def loop_costs(
                 if k * terms.step >= plans[i, q, 2]:
                     head_x, head_y = offset_x * to_x - offset_y * to_y, offset_x * to_y + offset_y * to_x
                     commanded = plans[i, q, 4]
-                error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
-                command = yaw_command(error, terms)
+                if sequence:
+                    commanded, command = plans[i, q, 2 * k], plans[i, q, 2 * k + 1]
+                else:
+                    error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
+                    command = yaw_command(error, terms)
                 half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(command, w, terms))
                 w = command
                 gained = speed_gained(commanded, v, terms)
@@ -190,6 +204,9 @@ def loop_costs(
                         weighted = weighted + crowd.entrance_weight[i, e] * at_entrance(from_x, from_y, terms)
                 within = within + weighted * terms.zone_time[k]
                 x, y = next_x, next_y
+                if states.shape[0] > 0:
+                    own = states[i, q, k]
+                    own[0], own[1], own[2], own[3], own[4], own[5] = x, y, cosine, sine, v, w
                 to_x, to_y = goal[i, 0] - x, goal[i, 1] - y
                 time = (k + 1) * terms.step
                 remaining = _root(to_x * to_x + to_y * to_y)
@@ -199,7 +216,7 @@ def loop_costs(
                 # A robot that was thrown is faster than its limit: then the way that is left promises nothing.
                 left = remaining if v <= terms.max_speed else 0.0
                 least = time + (left - terms.arrival_distance) / terms.max_speed + 0.5 * (total + most) + within
-                if least > best[i, -1] + 1e-6:
+                if least > best[i, -1] + slack + 1e-6:
                     given_up = True
                     break
             if given_up:
