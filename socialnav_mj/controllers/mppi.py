@@ -86,7 +86,7 @@ class MPPI(Planner):
         # What a plan is drawn to is not known to the loops: its span is added to what may be given up.
         span = float(drawn.max(initial=0.0) - drawn.min(initial=0.0))
         costs, _ = costs_of(
-            np.ascontiguousarray(plans.reshape(len(rows), -1, 2 * STEPS)),
+            np.ascontiguousarray(plans.reshape(*plans.shape[:2], 2 * STEPS)),
             speed,
             yaw_rate,
             goal,

@@ -25,6 +25,9 @@ from socialnav_mj.controllers.registry import (
 )
 from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, policy_of
 
+LEARNED = ("replay_irl", "irl_mpc")
+"""Built-in controllers that a field `policy` lets act with a trained policy."""
+
 
 def with_policy_of(spec: str, dataset: str) -> str:
     """Let a learned controller act with the policy that learned from the recording it is to be judged on.
@@ -34,8 +37,8 @@ def with_policy_of(spec: str, dataset: str) -> str:
         dataset: Name of the recording.
 
     Returns:
-        The spec with the recording's shipped policy wherever "replay_irl" stands without one; unchanged if it names its
-        policies, learns nothing, or no shipped policy learned from this recording alone.
+        The spec with the recording's shipped policy wherever one of `LEARNED` stands without one; unchanged if it names
+        its policies, learns nothing, or no shipped policy learned from this recording alone.
 
     Raises:
         ValueError: If the spec cannot be read.
@@ -44,7 +47,7 @@ def with_policy_of(spec: str, dataset: str) -> str:
     label, plain = split_label(spec)
     name, config = parse(plain)
     found: dict[str, Any] = {}
-    if name == "replay_irl" and "policy" not in config and policy != DEFAULT_POLICY:
+    if name in LEARNED and "policy" not in config and policy != DEFAULT_POLICY:
         found = {"policy": policy}
     elif name in BUILT_IN and parts_of(BUILT_IN[name]):
         default = controller_config(BUILT_IN[name]())
