@@ -12,6 +12,7 @@ import numpy as np
 
 from socialnav_mj.controllers.planning import loops
 from socialnav_mj.controllers.planning.loops import _either, _larger, _root, _smaller
+from socialnav_mj.elementary import cos, sin
 from socialnav_mj.geometry import Array
 
 STRIDE = 4
@@ -19,7 +20,7 @@ STRIDE = 4
 _SIGHT, _RISK_TIME, _YAW_SCALE = 6.0, 4.0, 2.618
 _SECTORS = 12
 _CENTRES = 2.0 * np.pi / _SECTORS * np.arange(_SECTORS)
-_AHEAD, _LEFT = np.cos(_CENTRES).round(12), np.sin(_CENTRES).round(12)
+_AHEAD, _LEFT = cos(_CENTRES).round(12), sin(_CENTRES).round(12)
 _SIZE = 6 + 4 * _SECTORS
 
 Layers = tuple[tuple[Array, Array], ...]
