@@ -5,13 +5,12 @@ import pytest
 from test_planning import CROSSING, episode_of, nearest_person, random_problem
 from test_protocol import Walks, actions
 
-from socialnav_mj.controllers import controller_config, controller_of, make_controller
+from socialnav_mj.controllers import controller_config, controller_of, make_controller, with_policy_of
 from socialnav_mj.controllers.irl_mpc import IRLMPC
 from socialnav_mj.controllers.planning import learned
 from socialnav_mj.controllers.planning.arrays import plan_costs
 from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.replay_irl import load_policy
-from socialnav_mj.controllers.specs import with_policy_of
 from socialnav_mj.features import Continuous, View, running_state
 from socialnav_mj.geometry import to_agent_frame
 from socialnav_mj.metrics.outcomes import success

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_protocol import LIMITS, Walks
 
-from socialnav_mj.controllers import controller_config, make_controller
+from socialnav_mj.controllers import controller_config, make_controller, with_policy_of
 from socialnav_mj.controllers.base import TwistController
 from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.mpc import MPC
@@ -16,7 +16,7 @@ from socialnav_mj.controllers.planning.imagination import Imagination
 from socialnav_mj.controllers.planning.terms import terms_of
 from socialnav_mj.controllers.prediction import constant_velocity
 from socialnav_mj.controllers.selector import Selector
-from socialnav_mj.controllers.specs import controller_of, with_policy_of
+from socialnav_mj.controllers.specs import controller_of
 from socialnav_mj.controllers.stand_still import StandStill
 from socialnav_mj.observation import observe
 

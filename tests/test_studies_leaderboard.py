@@ -10,6 +10,7 @@ from agents import rows_of, table_of
 from socialnav_mj.cli import main
 from socialnav_mj.report import style
 from socialnav_mj.studies.leaderboard.board import board_of
+from socialnav_mj.studies.leaderboard.families import Family, compare, families_of, verdict
 from socialnav_mj.studies.leaderboard.ranks import rank
 from socialnav_mj.studies.leaderboard.study import CONTROLLERS, Leaderboard
 from socialnav_mj.studies.panel import Entry
@@ -26,7 +27,7 @@ def draws_of(levels, *, n_draws=20, spread=0.01, seed=0):
     """Draws have luck of their own, which all controllers share, and each deviates a little."""
     random = np.random.default_rng(seed)
     luck = random.normal(0.0, 0.1, (n_draws, 1))
-    return np.array(levels) + luck + random.normal(0.0, spread, (n_draws, len(levels)))
+    return (np.array(levels) + luck + random.normal(0.0, spread, (n_draws, len(levels))))[:, None]
 
 
 def test_clear_differences_have_one_rank_each_whatever_draws_have_in_common():
@@ -40,7 +41,7 @@ def test_clear_differences_have_one_rank_each_whatever_draws_have_in_common():
 def test_ties_share_ranks():
     ranks = rank(draws_of([0.7, 0.7005, 0.2], spread=0.05), more_is_better=True)
     assert list(zip(ranks.lowest.tolist(), ranks.highest.tolist(), strict=True)) == [(1, 2), (1, 2), (3, 3)]
-    same = rank(np.full((5, 3), 0.5), more_is_better=True)
+    same = rank(np.full((5, 1, 3), 0.5), more_is_better=True)
     assert same.lowest.tolist() == [1, 1, 1] and same.highest.tolist() == [3, 3, 3]
     assert (same.improvement == 0.5).all() and (same.at_most == 1.0).all()
 
@@ -56,6 +57,90 @@ def test_rank_sets_of_all_equal_controllers_leave_nobody_out_in_nineteen_of_twen
         rank(draws_of([0.5] * 8, spread=0.05, seed=seed), more_is_better=True).better.any() for seed in range(200)
     ]
     assert np.mean(told_apart) < 0.1
+
+
+def test_trainings_that_differ_leave_controllers_tied_that_one_training_tells_apart():
+    """0.9 and 0.8 in every draw; the second one's trainings spread by .1, so that others might be better."""
+    random = np.random.default_rng(3)
+    fixed, learned = (level + random.normal(0.0, 0.005, (20, 3)) for level in (0.9, 0.8))
+    fixed[:] = fixed[:, :1]
+    alike = rank(np.stack([fixed, learned], axis=2), more_is_better=True)
+    assert alike.better.tolist() == [[False, True], [False, False]]
+    spread = rank(np.stack([fixed, learned + np.array([-0.1, 0.0, 0.1])], axis=2), more_is_better=True)
+    assert not spread.better.any()
+    assert spread.improvement[0, 1] == 1.0 and 0.5 < spread.at_most[0, 0] < 1.0
+
+
+def test_controller_with_fewer_trainings_is_compared_by_those_that_it_has():
+    cells = np.stack([draws_of([0.9, 0.9], spread=0.001)[:, 0], np.full((20, 2), 0.5)], axis=2)
+    cells[:, 1, 1] = np.nan
+    ranks = rank(cells, more_is_better=True)
+    assert ranks.lowest.tolist() == ranks.highest.tolist() == [1, 2]
+
+
+def rows_for(levels, *, n_draws=10):
+    """Agents of made-up controllers: {name: (share that succeeds, steps within 1.2 m, time)}; draws differ a little."""
+    return [
+        row
+        for name, (success, steps, time) in levels.items()
+        for draw in range(n_draws)
+        for row in rows_of(
+            name,
+            "scenario_1",
+            draw,
+            {
+                "success": [k < 100 * success - draw % 2 for k in range(100)],
+                "intimate_intrusions": [steps + draw * len(name) % 4] * 100,
+                "active_steps": 100,
+                "intrusion_share": steps / 100.0,
+                "time_under_way": time + 0.1 * (draw * len(name) % 5),
+            },
+        )
+    ]
+
+
+MADE = {
+    "potential_field": (0.70, 40, 15.0),
+    "replay_irl": (0.80, 30, 16.0),
+    "hybrid": (0.79, 31, 15.5),
+    "mpc": (0.99, 20, 11.0),
+    "mpc(preset='calm')": (0.96, 10, 15.5),
+}
+
+
+def board_of_made():
+    roster = [Entry(controller=name, method=name) for name in MADE]
+    return board_of(table_of(rows_for(MADE)), roster, recording="made")
+
+
+def test_marks_are_given_to_whoever_reaches_them():
+    """Strong: success >= .97, fewer steps than ReplayIRL, less time than the field. Calm: >= .95 and half the steps."""
+    marks = {mark.controller: mark for mark in board_of_made().marks}
+    assert [name for name, mark in marks.items() if mark.is_strong] == ["mpc"]
+    assert [name for name, mark in marks.items() if mark.is_calm] == ["mpc(preset='calm')"]
+    assert marks["mpc"].steps.mean == pytest.approx(-10.0, abs=1.0) and marks["mpc"].time.mean == pytest.approx(
+        -4.0, abs=0.2
+    )
+    some = board_of(table_of(rows_for({"mpc": MADE["mpc"]})), [Entry(controller="mpc", method="mpc")], recording="made")
+    assert some.marks == ()
+
+
+def test_mixtures_are_compared_with_all_their_parts():
+    families = families_of((*MADE, "selector", "mpdm"))
+    found = {family.child: family for family in families}
+    assert found["hybrid"].parents == ("replay_irl", "potential_field") and not found["hybrid"].missing
+    assert found["selector"].parents == ("mpc(preset='calm')", "hybrid") and found["selector"].missing == ("mpc",)
+    assert found["mpdm"].parents == ("replay_irl", "hybrid")
+    assert set(found["mpdm"].missing) == {"potential_field_capped", "social_force", "stand_still"}
+    board = board_of_made()
+    assert verdict(board, found["hybrid"], "scenario_1") == "no"
+    better = Family(child="mpc", parents=("potential_field", "replay_irl"), missing=())
+    assert verdict(board, better, "scenario_1") == "success"
+    calm = Family(child="mpc(preset='calm')", parents=("mpc", "replay_irl"), missing=())
+    assert verdict(board, calm, "scenario_1") == "nearness"
+    rows = compare(board, calm)
+    assert len(rows) == 2 * 3
+    assert rows[0]["difference"] == pytest.approx(-0.03) and rows[0]["verdict"] == -1
 
 
 def test_front_leaves_out_whoever_is_beaten_in_both():
@@ -88,6 +173,9 @@ def test_front_leaves_out_whoever_is_beaten_in_both():
         ({"recordings": (TINY, TINY)}, "one or more of different names"),
         ({"controllers": ("orca",)}, "two or more, each once"),
         ({"controllers": ("orca", "orca")}, "two or more, each once"),
+        ({"settings": ("icy",)}, "unknown setting 'icy'; available: default, turn_per_second"),
+        ({"trainings": 0}, "trainings = 0 is not allowed"),
+        ({"setting_draws": 11}, "setting_draws = 11 is not allowed; allowed: 1 to draws = 10"),
     ],
 )
 def test_impossible_boards_are_refused(changes, message):
@@ -98,25 +186,58 @@ def test_impossible_boards_are_refused(changes, message):
 def test_every_controller_that_goes_somewhere_is_on_the_board():
     assert {"potential_field", "replay_irl", "mpc", "selector", "mpdm", "orca"} <= set(CONTROLLERS)
     assert "stand_still" not in CONTROLLERS
-    learned = Leaderboard(recordings=("students003", "plaza")).rosters()
-    assert learned["students003"]["replay_irl"] == "replay_irl(policy='students003_continuous_seed0')"
-    assert learned["plaza"]["replay_irl"] == "replay_irl"
+    study = Leaderboard(recordings=("students003", "plaza"), trainings=1)
+    learned, default = ({e.method: e.controller for e in study.roster(name)} for name in study.recordings)
+    assert learned["replay_irl"] == "replay_irl(policy='students003_continuous_seed0')"
+    assert default["replay_irl"] == "replay_irl"
+
+
+def test_learned_controllers_stand_with_as_many_trainings_as_there_are():
+    study = Leaderboard(recordings=("students003", "plaza"), controllers=("orca", "replay_irl", "hybrid"), trainings=3)
+    entries = study.roster("students003")
+    assert [entry.training_seed for entry in entries if entry.method == "replay_irl"] == [0, 1, 2]
+    assert [entry.training_seed for entry in entries if entry.method == "hybrid"] == [0, 1, 2]
+    assert any("students003_continuous_seed2" in entry.controller for entry in entries if entry.method == "hybrid")
+    assert [entry.training_seed for entry in entries if entry.method == "orca"] == [None]
+    assert [entry.training_seed for entry in study.roster("plaza") if entry.method == "replay_irl"] == [None]
+
+
+def test_other_settings_run_on_the_first_recording_with_policies_for_their_turn_limit():
+    study = Leaderboard(
+        recordings=("students003", "plaza"),
+        controllers=("orca", "go_straight"),
+        settings=("radii_0.25", "turn_per_second"),
+        draws=20,
+        setting_draws=5,
+    )
+    runs = {run.name: run.evaluation for run in study.runs()}
+    assert list(runs) == ["students003", "plaza", "students003.radii_0.25", "students003.turn_per_second"]
+    assert runs["students003.radii_0.25"].task_kwargs == {"pedestrian_radius": 0.08}
+    assert (runs["plaza"].draws, runs["students003.turn_per_second"].draws) == (20, 5)
 
 
 def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
     out, public = tmp_path / "out", tmp_path / "results"
     command = ["leaderboard", "--recordings", TINY, "--scenarios", "1", "4", "--draws", "3", "--jobs", "1"]
     command += ["--controllers", "go_straight", "potential_field", "--also", "social_force"]
+    command += ["--settings", "radii_0.40", "--setting-draws", "2", "--costs", str(tmp_path / "costs.json")]
+    (tmp_path / "costs.json").write_text('{"controllers": [{"controller": "social_force", "ratio": 0.123}]}')
     main([*command, "--out", str(out), "--publish", str(public)])
     assert "leaderboard:" in capsys.readouterr().out
     assert sorted(path.name for path in public.iterdir()) == ["README.md", "figures", "provenance.json", "tables"]
     rows = list(csv.DictReader((public / "tables" / "leaderboard.csv").open()))
     assert {row["controller"] for row in rows} == {"go_straight", "potential_field", "social_force", "human"}
     ranked = [row for row in rows if row["measure"] == "success" and row["controller"] != "human"]
-    assert len(ranked) == 2 * 3
+    assert len(ranked) == 2 * 2 * 3
     assert all(1 <= int(row["lowest_rank"]) <= int(row["highest_rank"]) <= 3 for row in ranked)
     page = (public / "README.md").read_text()
-    for text in ("scenario 4: 90 % agents", "social_force | ", "## Ranks over recordings and scenarios", "| human |"):
+    for text in (
+        "scenario 4: 90 % agents",
+        "social_force | ",
+        "## Ranks over recordings and scenarios",
+        "| human |",
+        "0.12",
+    ):
         assert text in page
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")}
     main([*command, "--out", str(out)])

@@ -1,7 +1,12 @@
 """The sub-command `leaderboard`."""
 
+import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
 from socialnav_mj.cli.study import run_study
@@ -23,6 +28,14 @@ class Leaderboard:
     """As in `evaluate`; all built-in ones by default."""
     also: tuple[str, ...] = ()
     """Controllers that join them."""
+    trainings: int = 3
+    """Of controllers that learned and have as many, those with the least seeds."""
+    settings: tuple[str, ...] = ()
+    """Other settings in which the first recording is run: turn_per_second, radii_0.25, radii_0.40, retire."""
+    setting_draws: int | None = None
+    """Draws in these; all by default."""
+    costs: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """JSON file of `bench --controllers ... --out FILE`: what each controller costs stands beside its results."""
     scenarios: Scenarios = (1, 2, 3, 4)
     """Scenarios to run."""
     draws: int = 20
@@ -44,13 +57,16 @@ class Leaderboard:
             recordings=self.recordings,
             controllers=(*(self.controllers or leaderboard.CONTROLLERS), *self.also),
             data_dir=None if self.data_dir is None else str(self.data_dir),
+            trainings=self.trainings,
+            settings=self.settings,
+            setting_draws=self.setting_draws,
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             draws=self.draws,
             seed=self.seed,
         )
         run_study(
             study,
-            leaderboard.write_leaderboard,
+            partial(leaderboard.write_leaderboard, costs=None if self.costs is None else read_costs(self.costs)),
             leaderboard.PUBLIC,
             out=self.out,
             jobs=self.jobs,
@@ -58,3 +74,24 @@ class Leaderboard:
             making="tables and figure",
             label="leaderboard",
         )
+
+
+def read_costs(path: Path) -> dict[str, float]:
+    """What controllers cost, from a file of `bench --controllers ... --out FILE`.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Controller: its CPU time over that of the physics.
+
+    Raises:
+        ValueError: If the file is not one of those.
+        FileNotFoundError: If it is not there.
+    """
+    try:
+        return {str(row["controller"]): float(row["ratio"]) for row in json.loads(path.read_text())["controllers"]}
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(
+            f"{path} is not a file of `socialnav-mj bench --controllers ... --out FILE`: {error!r}"
+        ) from error

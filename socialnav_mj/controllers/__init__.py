@@ -7,7 +7,8 @@ from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.registry import BUILT_IN, available, class_path, make_controller
 from socialnav_mj.controllers.replay_irl import ReplayIRL
-from socialnav_mj.controllers.specs import controller_config, controller_of, spec_of, with_policy_of
+from socialnav_mj.controllers.specs import controller_config, controller_of, spec_of
+from socialnav_mj.controllers.trainings import with_policy_of, with_training
 
 __all__ = [
     "BUILT_IN",
@@ -28,4 +29,5 @@ __all__ = [
     "make_controller",
     "spec_of",
     "with_policy_of",
+    "with_training",
 ]

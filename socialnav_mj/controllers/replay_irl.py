@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import load
 
+from socialnav_mj.config import Scenario, TurnLimit
 from socialnav_mj.controllers.base import Observation, TwistController
 from socialnav_mj.controllers.policy_card import PolicyError, read_card
 from socialnav_mj.elementary import tanh
@@ -96,17 +97,20 @@ def shipped_policies() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in policies_folder().glob("*.safetensors")))
 
 
-def policy_of(dataset: str) -> str:
+def policy_of(dataset: str, turn_limit: TurnLimit = Scenario.turn_limit) -> str:
     """The shipped policy that learned from a recording alone; of several training seeds the first.
 
     Args:
         dataset: Name of the recording.
+        turn_limit: Under which it is to drive.
 
     Returns:
-        Its name; `DEFAULT_POLICY` if there is none.
+        Its name; that of one trained under the default limit if none was under this one, and `DEFAULT_POLICY` if none
+        learned from the recording.
     """
-    name = f"{dataset}_continuous_seed0"
-    return name if name in shipped_policies() else DEFAULT_POLICY
+    limit = "" if turn_limit == Scenario.turn_limit else f"_{turn_limit}"
+    names = (f"{dataset}_continuous{limit}_seed0", f"{dataset}_continuous_seed0")
+    return next((name for name in names if name in shipped_policies()), DEFAULT_POLICY)
 
 
 def policy_path(name_or_path: str) -> Path:

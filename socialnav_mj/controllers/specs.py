@@ -23,41 +23,6 @@ from socialnav_mj.controllers.registry import (
     settings_of,
     split_label,
 )
-from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, policy_of
-
-LEARNED = ("replay_irl", "irl_mpc")
-"""Built-in controllers that a field `policy` lets act with a trained policy."""
-
-
-def with_policy_of(spec: str, dataset: str) -> str:
-    """Let a learned controller act with the policy that learned from the recording it is to be judged on.
-
-    Args:
-        spec: As `make_controller` takes it.
-        dataset: Name of the recording.
-
-    Returns:
-        The spec with the recording's shipped policy wherever one of `LEARNED` stands without one; unchanged if it names
-        its policies, learns nothing, or no shipped policy learned from this recording alone.
-
-    Raises:
-        ValueError: If the spec cannot be read.
-    """
-    policy = policy_of(dataset)
-    label, plain = split_label(spec)
-    name, config = parse(plain)
-    found: dict[str, Any] = {}
-    if name in LEARNED and "policy" not in config and policy != DEFAULT_POLICY:
-        found = {"policy": policy}
-    elif name in BUILT_IN and parts_of(BUILT_IN[name]):
-        default = controller_config(BUILT_IN[name]())
-        parts = {part: config.get(part, default[part]) for part in parts_of(BUILT_IN[name])}
-        own = {part: _each(old, partial(with_policy_of, dataset=dataset)) for part, old in parts.items()}
-        found = {part: new for part, new in own.items() if new != parts[part]}
-    if not found:
-        return spec
-    return ("" if label is None else f"{label}=") + _text(name, config | found)
-
 
 _BESIDE = ("class", "attributes", "sources")
 """Keys of a controller's configuration that are no settings."""
@@ -85,7 +50,7 @@ def controller_config(controller: Controller) -> dict[str, Any]:
     for name, value in _settings(controller).items():
         try:
             is_part = name in parts_of(kind)
-            settings[name] = _each(value, spec_of) if is_part else json.loads(json.dumps(value, allow_nan=False))
+            settings[name] = each(value, spec_of) if is_part else json.loads(json.dumps(value, allow_nan=False))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}.{name} = {value!r} is not allowed; allowed: JSON values") from error
         for part in (value if isinstance(value, list | tuple) else (value,)) if is_part else ():
@@ -148,7 +113,7 @@ def spec_of(controller: Controller) -> str:
         # With settings, a spec without a name would be the name.
         if (name != "name" or not fewer) and _makes(kind, fewer, wanted):
             settings = fewer
-    return _text(names[0], settings)
+    return text_of(names[0], settings)
 
 
 def _is_made_by(spec: str, names: Collection[str], wanted: dict[str, Any], kind: Callable[..., Controller]) -> bool:
@@ -168,7 +133,16 @@ def _makes(kind: Callable[..., Controller], settings: dict[str, Any], wanted: di
         return False
 
 
-def _text(name: str, settings: dict[str, Any]) -> str:
+def text_of(name: str, settings: dict[str, Any]) -> str:
+    """A spec.
+
+    Args:
+        name: Of the controller.
+        settings: Its keyword arguments, literals.
+
+    Returns:
+        Text that `make_controller` reads.
+    """
     return f"{name}({', '.join(f'{key}={value!r}' for key, value in settings.items())})" if settings else name
 
 
@@ -233,7 +207,7 @@ def _check_values(path: str, kind: Callable[..., Controller], values: dict[str, 
         except TypeCheckError as error:
             raise ValueError(f"controller {path!r}: {name} = {value!r} is not allowed: {error}") from error
         if name in parts_of(kind):
-            _each(value, partial(_check_trusted_spec, trusted=trusted))
+            each(value, partial(_check_trusted_spec, trusted=trusted))
 
 
 def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
@@ -243,11 +217,19 @@ def _check_trusted_spec(spec: str, trusted: Collection[str]) -> None:
     factory = factory_of(name)
     for part in parts_of(factory):
         if part in config:
-            _each(config[part], partial(_check_trusted_spec, trusted=trusted))
+            each(config[part], partial(_check_trusted_spec, trusted=trusted))
 
 
-def _each(part: Any, function: Callable[[Any], Any]) -> Any:
-    """A function of one part, or the list of it for several."""
+def each(part: Any, function: Callable[[Any], Any]) -> Any:
+    """A function of one part, or the list of it for several.
+
+    Args:
+        part: What a field of a controller holds: one, or a list or tuple of several.
+        function: Of one.
+
+    Returns:
+        Its value, or the list of its values.
+    """
     return [function(one) for one in part] if isinstance(part, list | tuple) else function(part)
 
 

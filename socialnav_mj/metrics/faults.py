@@ -86,7 +86,6 @@ METRICS = (
             better=Better.LESS,
             missing=NEVER,
             needs=(Need.CONTACTS,),
-            means=(),
             formula=f"of `collisions_{kind.name.lower()}`: {_WHO_MOVED[who]}",
             source="below",
         )

@@ -82,7 +82,7 @@ def interval_of(cells: Array, *, trained: bool = False, agents: int | None = Non
     if n_draws < LEAST:
         count = f"{n_draws} draw{'s' if n_draws > 1 else ''}"
         return _without(mean, n_draws, counted, f"{count}; an interval needs {LEAST}")
-    parts = _parts(cells)
+    parts = variance_parts(cells)
     given = _ends(mean, *combined(parts[0], 0.0, 0.0, n_draws, 1), agents)
     both, note = given, ""
     if trained and n_trainings >= LEAST:
@@ -145,7 +145,7 @@ def components_of(cells: Array) -> Components:
     """
     cells = cells[np.isfinite(cells).any(axis=1)][:, np.isfinite(cells).any(axis=0)]
     n_draws, n_trainings = cells.shape
-    of_draws, of_trainings, of_cells = _parts(cells)
+    of_draws, of_trainings, of_cells = variance_parts(cells)
     cell = of_cells * n_draws * n_trainings
     return Components(
         draw=max(of_draws * n_draws - cell / n_trainings, 0.0),
@@ -171,8 +171,15 @@ def reach(components: Components, n_draws: NDArray[np.int64], n_trainings: NDArr
     return np.asarray(stdtrit(freedom, _TAIL) * np.sqrt(variance))
 
 
-def _parts(cells: Array) -> tuple[float, float, float]:
-    """V_draw, V_training and V_cell; the latter two are 0 for one column. NaN cells are left out of the means."""
+def variance_parts(cells: Array) -> tuple[float, float, float]:
+    """V_draw, V_training and V_cell of `interval_of`.
+
+    Args:
+        cells: Mean of each draw and training, shape (n_draws, n_trainings), n_draws >= 2; NaN cells are left out.
+
+    Returns:
+        Variances; the latter two are 0 for one column.
+    """
     n_draws, n_trainings = cells.shape
     rows, columns = np.nanmean(cells, axis=1), np.nanmean(cells, axis=0)
     of_draws = float(rows.var(ddof=1)) / n_draws

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from socialnav_mj.geometry import Array
 from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.studies.leaderboard.marks import Mark, marks_of
 from socialnav_mj.studies.leaderboard.ranks import Ranks, rank
 from socialnav_mj.studies.levels import LevelTable, levels
 from socialnav_mj.studies.panel import Entry, Panel, Term, make_panel
+from socialnav_mj.studies.settings import DEFAULT
 
 RANKED = {"success": True, "intrusion_share_of_steps": False, "time_under_way": False}
 """Measure: whether more is better."""
@@ -19,6 +22,9 @@ MEASURES = (
     "intimate_intrusions",
     "first_hit_pedestrian",
     "first_hit_agent",
+    "collisions_pedestrian_by_agent",
+    "collisions_pedestrian_by_both",
+    "collisions_pedestrian_by_partner",
     "timed_out",
     "average_speed",
     "struck_standing",
@@ -32,11 +38,15 @@ class Board:
     """Controllers side by side on one recording."""
 
     recording: str
+    setting: str
+    """Of `settings.SETTINGS`."""
     controllers: tuple[str, ...]
     table: LevelTable
     """Of the controllers under their names on the board, and the human row."""
     ranks: Mapping[tuple[str, str], Ranks]
     """Scenario and measure of `RANKED`: ranks in the order of the controllers."""
+    marks: tuple[Mark, ...]
+    """See `marks.marks_of`."""
 
     @property
     def scenarios(self) -> tuple[str, ...]:
@@ -100,6 +110,7 @@ class Board:
                     rows.append(
                         {
                             "recording": self.recording,
+                            "setting": self.setting,
                             "scenario": scenario,
                             "controller": method,
                             "measure": measure,
@@ -107,6 +118,7 @@ class Board:
                             "low": level.interval.low,
                             "high": level.interval.high,
                             "n_draws": level.interval.n_draws,
+                            "n_trainings": level.interval.n_trainings,
                             "n_values": level.n_values,
                             "lowest_rank": "" if ranks is None else int(ranks.lowest[place]),
                             "highest_rank": "" if ranks is None else int(ranks.highest[place]),
@@ -119,10 +131,12 @@ class Board:
         return [
             {
                 "recording": self.recording,
+                "setting": self.setting,
                 "scenario": scenario,
                 "measure": measure,
                 "controller": one,
                 "other": other,
+                "difference": self.mean(scenario, i, measure) - self.mean(scenario, j, measure),
                 "distinguishably_better": int(ranks.better[i, j]),
                 "probability_of_improvement": ranks.improvement[i, j],
             }
@@ -133,36 +147,44 @@ class Board:
         ]
 
 
-def board_of(agents: pa.Table, roster: Sequence[Entry], *, recording: str) -> Board:
+def board_of(agents: pa.Table, roster: Sequence[Entry], *, recording: str, setting: str = DEFAULT) -> Board:
     """The leaderboard of a recording.
 
     Args:
         agents: Columns of `agents.SCHEMA`, of one recording.
         roster: Controllers under their names on the board, and the human row.
         recording: Its name.
+        setting: Of `settings.SETTINGS`.
 
     Returns:
         The board.
     """
     panel = make_panel(agents, roster)
-    methods = [entry.method for entry in roster]
+    methods = list(dict.fromkeys(entry.method for entry in roster))
     controllers = tuple(method for method in methods if method != HUMAN)
     ranks = {
-        (scenario, measure): rank(_by_draw(panel, scenario, controllers, measure), more_is_better=more)
+        (scenario, measure): rank(_cells(panel, scenario, controllers, measure), more_is_better=more)
         for scenario in panel.scenarios
         for measure, more in RANKED.items()
     }
     table = LevelTable(rows=tuple(levels(panel, MEASURES, methods=methods, each_training=False)))
-    return Board(recording=recording, controllers=controllers, table=table, ranks=ranks)
+    return Board(
+        recording=recording,
+        setting=setting,
+        controllers=controllers,
+        table=table,
+        ranks=ranks,
+        marks=marks_of(panel, controllers),
+    )
 
 
-def _by_draw(
-    panel: Panel, scenario: str, controllers: Sequence[str], measure: str
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Means of draws, (n_draws, k), over draws in which every controller has a value."""
-    columns = [
-        panel.contrast([Term(factor=1.0, method=name, scenario=scenario, measure=measure)]).mean(axis=1)
-        for name in controllers
-    ]
-    means = np.stack(columns, axis=1)
-    return means[np.isfinite(means).all(axis=1)]
+def _cells(panel: Panel, scenario: str, controllers: Sequence[str], measure: str) -> Array:
+    """Means of draws and trainings, (n_draws, n_trainings, k), over draws in which every controller has a value."""
+    width = max(len(panel.trainings), 1)
+    columns = []
+    for name in controllers:
+        own = panel.contrast([Term(factor=1.0, method=name, scenario=scenario, measure=measure)])
+        columns.append(own if own.shape[1] == width else np.broadcast_to(own, (len(own), width)))
+    cells = np.stack(columns, axis=2)
+    there = np.isfinite(cells).any(axis=1)
+    return cells[np.all(there, axis=1)]

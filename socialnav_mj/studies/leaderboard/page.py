@@ -6,28 +6,47 @@ from typing import Any
 import numpy as np
 
 from socialnav_mj.report.intervals import ONE_RECORDING
-from socialnav_mj.report.markdown import table
+from socialnav_mj.report.markdown import interval, number, table
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.leaderboard.board import RANKED, Board
+from socialnav_mj.studies.leaderboard.families import Family, compare, verdict
+from socialnav_mj.studies.leaderboard.marks import FAIR_SUCCESS, HIGH_SUCCESS
 from socialnav_mj.studies.looks import SCENARIO_TITLES
+from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 
 _HOW_TO_READ = f"""\
 Every controller drove the same agents among the same people. *Rank set*: the ranks that a controller can have; all \
 rank sets of a table hold together in 95 % of studies, so that two whose sets overlap without a sure difference are \
 tied, whatever their means. There is no single score: success, nearness to people and time are ranked apart, and a \
 **bold** name is on the front of success and nearness: nobody has more success and fewer steps within 1.2 m at once. \
-*Impact*: momentum of an agent's hardest collision. {ONE_RECORDING} Each recording is a task of its own; the last \
+*Hits on people* are counted for 100 agents, by who moved into whom: the agent alone, both, the person alone. \
+*Impact*: momentum of an agent's hardest collision. *Cost*: CPU time for an agent and step over that of the physics. \
+Of controllers that learned, several trainings were run, and all that is said of them is said of other trainings too. \
+{ONE_RECORDING} Each recording is a task of its own; the last \
 table says how ranks differ between them, which is all that is known of a recording that is not here.
 """
+_FAMILIES = """\
+Each controller that chooses among others beside all of its parts and the paper's 2 m switch: difference of success \
+and of the share of steps within 1.2 m, child minus parent, by scenario; **bold** where the two are distinguishable, \
+all pairs of the table together. The verdict is *success* or *nearness* if the child is distinguishably better there \
+than every other, *front* if it is better than each of them in one of the two and worse in neither, else *no*."""
 
 
-def leaderboard_page(boards: Sequence[Board], *, provenance: Mapping[str, Any]) -> str:
+def leaderboard_page(
+    boards: Sequence[Board],
+    *,
+    families: Sequence[Family],
+    costs: Mapping[str, float],
+    provenance: Mapping[str, Any],
+) -> str:
     """Text of the study's README.md.
 
     Args:
-        boards: One for each recording.
+        boards: One for each recording and setting.
+        families: Controllers that choose among others.
+        costs: CPU time of a controller over that of the physics, by its name on the board.
         provenance: Command, experiment, recordings, runs.
 
     Returns:
@@ -35,25 +54,90 @@ def leaderboard_page(boards: Sequence[Board], *, provenance: Mapping[str, Any]) 
     """
     lines = ["# Leaderboard", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ]
     lines += ["![fronts](figures/fronts.png)", ""]
+    if any(board.marks for board in boards):
+        lines += ["## Marks", "", *_marks(boards), ""]
+    if families:
+        lines += ["## Is a mixture better than its best part?", "", *_families(boards, families), ""]
     for board in boards:
-        lines += [f"## {board.recording}", ""]
+        lines += [f"## {_title(board)}", ""]
         for scenario in board.scenarios:
-            lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(board, scenario), ""]
+            heading = SCENARIO_TITLES.get(scenario, scenario)
+            lines += [f"### {heading}", "", *_scenario(board, scenario, costs), ""]
     lines += ["## Ranks over recordings and scenarios", "", *_over_all(boards), ""]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
 
 
-def _scenario(board: Board, scenario: str) -> list[str]:
+def _title(board: Board) -> str:
+    return board.recording if board.setting == DEFAULT else f"{board.recording}, {SETTINGS[board.setting].title}"
+
+
+def _marks(boards: Sequence[Board]) -> list[str]:
+    lines = [
+        f"*Strong*: success of at least {HIGH_SUCCESS} in every scenario, and surely (paired intervals of 95 %) fewer "
+        "steps within 1.2 m than ReplayIRL and less time than the paper's potential field in every scenario. *Calm*: "
+        f"success of at least {FAIR_SUCCESS}, and surely at most half of ReplayIRL's steps, in every scenario. "
+        "Numbers: success, and steps for each agent minus ReplayIRL's with their interval, by scenario.",
+        "",
+    ]
+    for board in boards:
+        rows = []
+        for name in dict.fromkeys(mark.controller for mark in board.marks):
+            own = [mark for mark in board.marks if mark.controller == name]
+            held = {"strong": all(m.is_strong for m in own), "calm": all(m.is_calm for m in own)}
+            words = [word for word, holds in held.items() if holds]
+            rows.append(
+                [
+                    name,
+                    ", ".join(words) or "-",
+                    " / ".join(number(m.success.mean, 3) for m in own),
+                    " / ".join(interval(m.steps.mean, m.steps.low, m.steps.high, 1, "+") for m in own),
+                    " / ".join(interval(m.time.mean, m.time.low, m.time.high, 1, "+") for m in own),
+                ]
+            )
+        heads = ["controller", "marks", "success", "steps - ReplayIRL's", "time - potential field's [s]"]
+        lines += [f"{_title(board)}:", "", *table(heads, rows), ""] if rows else []
+    return lines
+
+
+def _families(boards: Sequence[Board], families: Sequence[Family]) -> list[str]:
+    lines = [_FAMILIES, ""]
+    for board in boards:
+        rows = []
+        for family in families:
+            verdicts = " / ".join(verdict(board, family, scenario) for scenario in board.scenarios)
+            found = compare(board, family)
+            for parent in family.parents:
+                own = [row for row in found if row["parent"] == parent]
+                cells = [
+                    " / ".join(_difference(row) for row in own if row["measure"] == measure)
+                    for measure in ("success", "intrusion_share_of_steps")
+                ]
+                rows.append([family.child, parent, *cells, verdicts])
+        heads = ["controller", "part", "success", "share of steps", "verdict by scenario"]
+        lines += [f"{_title(board)}:", "", *table(heads, rows), ""]
+    missing = {name: family.child for family in families for name in family.missing}
+    lines += [f"Not on the board: {name}, a part of {child}." for name, child in missing.items()]
+    return lines
+
+
+def _difference(row: Mapping[str, Any]) -> str:
+    text = f"{row['difference']:+.3f}"
+    return f"**{text}**" if row["verdict"] else text
+
+
+def _scenario(board: Board, scenario: str, costs: Mapping[str, float]) -> list[str]:
     rows = []
     front = board.front(scenario, "intrusion_share_of_steps")
     for k in board.order(scenario):
         name = board.controllers[k]
         rows.append([f"**{name}**" if k in front else name, *_cells(board, scenario, board.controllers[k])])
         rows[-1] += [_set(board, scenario, measure, k) for measure in RANKED]
-    rows.append([HUMAN, *_cells(board, scenario, HUMAN), *("-" for _ in RANKED)])
+        rows[-1] += [number(costs.get(board.controllers[k], float("nan")), 2)] if costs else []
+    rows.append([HUMAN, *_cells(board, scenario, HUMAN), *("-" for _ in RANKED), *(["-"] if costs else [])])
     heads = ["controller", "success", "steps within 1.2 m", "share of steps", "time, censored [s]"]
-    heads += ["hit first by a pedestrian / agent", "timed out", "impact [N s]"]
-    return table([*heads, "ranks: success", "ranks: share of steps", "ranks: time"], rows)
+    heads += ["hit first by a pedestrian / agent", "hits on people: agent / both / person", "timed out", "impact [N s]"]
+    heads += ["ranks: success", "ranks: share of steps", "ranks: time"]
+    return table([*heads, "cost"] if costs else heads, rows)
 
 
 def _cells(board: Board, scenario: str, method: str) -> list[str]:
@@ -66,9 +150,14 @@ def _cells(board: Board, scenario: str, method: str) -> list[str]:
         interval_cell(find("intrusion_share_of_steps")),
         mean_cell(find("time_under_way"), 1),
         f"{mean_cell(find('first_hit_pedestrian'), 3)} / {mean_cell(find('first_hit_agent'), 3)}",
+        " / ".join(_hundred(find(f"collisions_pedestrian_by_{who}")) for who in ("agent", "both", "partner")),
         mean_cell(find("timed_out"), 3),
         mean_cell(find("largest_impact_impulse"), 1),
     ]
+
+
+def _hundred(level: Any) -> str:
+    return "-" if level is None else number(100.0 * level.interval.mean, 1)
 
 
 def _set(board: Board, scenario: str, measure: str, place: int) -> str:

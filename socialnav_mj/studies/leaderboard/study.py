@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from socialnav_mj.controllers import BUILT_IN
-from socialnav_mj.controllers.specs import with_policy_of
+from socialnav_mj.controllers import BUILT_IN, with_policy_of, with_training
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
@@ -14,9 +13,11 @@ from socialnav_mj.report.results import Results
 from socialnav_mj.studies.files import write_csv, write_provenance
 from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
+from socialnav_mj.studies.leaderboard.families import compare, families_of
 from socialnav_mj.studies.leaderboard.figure import draw_fronts
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
 from socialnav_mj.studies.panel import Entry
+from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 from socialnav_mj.studies.study import Run, Study, read_runs
 
 CONTROLLERS = (*(name for name in BUILT_IN if name != "stand_still"), "mpc(preset='calm')", "mpc(preset='free')")
@@ -35,47 +36,74 @@ class Leaderboard(Study):
     """As `make_controller` takes them; learned ones act with the policy of the recording, if there is one."""
     policies: tuple[str, ...] = ()
     """Not asked: policies are part of the controllers."""
+    trainings: int = 3
+    """Of each controller that learned and has as many, those with the least seeds; others stand with one."""
+    settings: tuple[str, ...] = ()
+    """Other settings in which the first recording is run, of `SETTINGS`."""
+    setting_draws: int | None = None
+    """Draws in these, the first ones of `draws`; None for all."""
 
     def __post_init__(self) -> None:
         if not self.recordings or len({recording_name(r) for r in self.recordings}) < len(self.recordings):
             raise ValueError(f"recordings = {self.recordings} is not allowed; allowed: one or more of different names")
         if len(self.controllers) < 2 or len(set(self.controllers)) < len(self.controllers):
             raise ValueError(f"controllers = {self.controllers} is not allowed; allowed: two or more, each once")
+        if unknown := [name for name in self.settings if name not in SETTINGS]:
+            raise ValueError(f"unknown setting {unknown[0]!r}; available: {', '.join(SETTINGS)}")
+        if self.trainings < 1:
+            raise ValueError(f"trainings = {self.trainings} is not allowed; allowed: integers >= 1")
+        if self.setting_draws is not None and not 1 <= self.setting_draws <= self.draws:
+            raise ValueError(f"setting_draws = {self.setting_draws} is not allowed; allowed: 1 to draws = {self.draws}")
 
-    def rosters(self) -> dict[str, dict[str, str]]:
-        """Recording: the controllers' names on the board, and what they are there.
+    def roster(self, recording: str, setting: str = DEFAULT) -> tuple[Entry, ...]:
+        """Who runs on a recording.
+
+        Args:
+            recording: One of `recordings`.
+            setting: Of `SETTINGS`.
 
         Returns:
-            Spec as it was given: spec with the policy of the recording.
+            Each controller under its spec as it was given; of one that learned, with the policies of the recording and
+            the setting's turn limit, an entry for each of the first trainings, if there are as many as are asked for.
         """
-        return {
-            recording_name(recording): {spec: with_policy_of(spec, recording) for spec in self.controllers}
-            for recording in self.recordings
-        }
+        entries: list[Entry] = []
+        for spec in self.controllers:
+            own = with_policy_of(spec, recording_name(recording), SETTINGS[setting].turn_limit)
+            trained = [with_training(own, seed) for seed in range(self.trainings)]
+            found = [one for one in trained if one is not None]
+            if self.trainings > 1 and len(found) == self.trainings:
+                entries += [Entry(controller=one, method=spec, training_seed=k) for k, one in enumerate(found)]
+            else:
+                entries.append(Entry(controller=own, method=spec))
+        return (*entries, Entry(controller=HUMAN, method=HUMAN))
 
     def runs(self) -> list[Run]:
-        """One evaluation for each recording.
+        """One evaluation for each recording in the default setting, then those in the others.
 
         Returns:
-            In the order of the recordings, and named after them.
+            Named after recording and setting.
         """
-        return [self._run(recording, self.rosters()[recording_name(recording)]) for recording in self.recordings]
+        runs = [self._run(recording, DEFAULT) for recording in self.recordings]
+        return runs + [self._run(self.recordings[0], setting) for setting in self.settings if setting != DEFAULT]
 
-    def _run(self, recording: str, roster: Mapping[str, str]) -> Run:
-        entries = tuple(Entry(controller=own, method=spec) for spec, own in roster.items())
+    def _run(self, recording: str, setting: str) -> Run:
+        roster = self.roster(recording, setting)
         evaluation = Evaluation(
             dataset=recording,
             data_dir=self.data_dir,
             scenarios=self.scenarios,
-            controllers=tuple(roster.values()),
-            draws=self.draws,
+            controllers=tuple(entry.controller for entry in roster if entry.method != HUMAN),
+            draws=self.draws if setting == DEFAULT else self.setting_draws or self.draws,
             seed=self.seed,
+            task_kwargs=dict(SETTINGS[setting].task_kwargs),
         )
-        human = Entry(controller=HUMAN, method=HUMAN)
-        return Run(name=recording_name(recording), evaluation=evaluation, roster=(*entries, human))
+        name = recording_name(recording)
+        return Run(name=name if setting == DEFAULT else f"{name}.{setting}", evaluation=evaluation, roster=roster)
 
 
-def write_leaderboard(study: Leaderboard, out: Path, *, command: str, n_jobs: int = -1) -> Path:
+def write_leaderboard(
+    study: Leaderboard, out: Path, *, command: str, n_jobs: int = -1, costs: Mapping[str, float] | None = None
+) -> Path:
     """Make everything in the study's folder again, except its episodes.
 
     Args:
@@ -83,6 +111,7 @@ def write_leaderboard(study: Leaderboard, out: Path, *, command: str, n_jobs: in
         out: Its folder; gets tables/, figures/, README.md and provenance.json.
         command: That made it.
         n_jobs: Processes that score episodes.
+        costs: CPU time of controllers over that of the physics, as `bench --controllers` measures it.
 
     Returns:
         Path of README.md.
@@ -93,13 +122,22 @@ def write_leaderboard(study: Leaderboard, out: Path, *, command: str, n_jobs: in
     """
     results = read_runs(study, out, n_jobs=n_jobs)
     boards = _boards(study, results)
+    families = families_of(study.controllers)
     write_csv(out / "tables" / "leaderboard.csv", [row for board in boards for row in board.rows()])
     write_csv(out / "tables" / "pairs.csv", [row for board in boards for row in board.pair_rows()])
+    compared = [row for board in boards for family in families for row in compare(board, family)]
+    write_csv(out / "tables" / "parents.csv", compared)
     draw_fronts(boards, out / "figures")
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     provenance = write_provenance(study, results, recordings, out, command=command)
-    return write_whole(out / "README.md", leaderboard_page(boards, provenance=provenance).encode())
+    page = leaderboard_page(boards, families=families, costs=costs or {}, provenance=provenance)
+    return write_whole(out / "README.md", page.encode())
 
 
 def _boards(study: Leaderboard, results: Mapping[str, Results]) -> list[Board]:
-    return [board_of(results[run.name].agents, run.roster, recording=run.name) for run in study.runs()]
+    boards = []
+    for run in study.runs():
+        name, _, setting = run.name.partition(".")
+        name, setting = (name, setting) if setting in SETTINGS else (run.name, DEFAULT)
+        boards.append(board_of(results[run.name].agents, run.roster, recording=name, setting=setting))
+    return boards

@@ -12,6 +12,7 @@ from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.studies.panel import CAPPED, MIXED, POTENTIAL_FIELD, REPLAY_IRL, ROBOTS, Entry
+from socialnav_mj.studies.settings import SETTINGS
 from socialnav_mj.studies.study import Run, Study, learned
 
 SWITCH_DISTANCE = 2.0
@@ -45,19 +46,19 @@ class Variant:
         return str(self.task_kwargs.get("turn_limit", Scenario.turn_limit))
 
 
+def _of_setting(name: str, *, is_full: bool = False) -> Variant:
+    setting = SETTINGS[name]
+    return Variant(name=name, title=setting.title, task_kwargs=dict(setting.task_kwargs), is_full=is_full)
+
+
 DEFAULT = Variant(name="default", title="default", is_full=True)
 VARIANTS: tuple[Variant, ...] = (
     DEFAULT,
     Variant(name="capped", title="capped field in the paper's place", field=CAPPED, runs=(MIXED,), is_full=True),
-    Variant(
-        name="turn_per_second",
-        title="turn limit per second, policies trained for it",
-        task_kwargs={"turn_limit": "per_second"},
-        is_full=True,
-    ),
-    Variant(name="radii_0.25", title="radii sum 0.25 m", task_kwargs={"pedestrian_radius": 0.08}),
-    Variant(name="radii_0.40", title="radii sum 0.40 m", task_kwargs={"pedestrian_radius": 0.23}),
-    Variant(name="retire", title="retire on collision", task_kwargs={"on_collision": "retire"}),
+    _of_setting("turn_per_second", is_full=True),
+    _of_setting("radii_0.25"),
+    _of_setting("radii_0.40"),
+    _of_setting("retire"),
     Variant(name="switch_anyone", title="agents count in the switch", who="anyone", runs=(MIXED,)),
 )
 """The default setting first."""
