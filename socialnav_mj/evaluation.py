@@ -4,22 +4,33 @@ import json
 import logging
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from socialnav_mj import suite
 from socialnav_mj.config import Scenario
-from socialnav_mj.controllers import controller_config, make_controller
+from socialnav_mj.controllers import make_controller, split_label
 from socialnav_mj.environment import build_environment
-from socialnav_mj.episode import EpisodeError, check_name, read_header
-from socialnav_mj.files import clear_leftovers, finished_files, write_whole
+from socialnav_mj.files import check_output, clear_leftovers, finished_files, write_whole
 from socialnav_mj.human import HUMAN, human_episode
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import DEFAULT_READING, Reading, Recording, load_recording
+from socialnav_mj.recordings.known import unverified
 from socialnav_mj.recordings.plausibility import doubts
+from socialnav_mj.resumption import (
+    Change,
+    ChangedError,
+    Named,
+    OnChange,
+    Wanted,
+    changes,
+    name_of_version,
+    named_controllers,
+    set_aside,
+)
 from socialnav_mj.rollout import rollout
 
 logger = logging.getLogger(__name__)
@@ -115,7 +126,14 @@ def jobs_of(evaluation: Evaluation) -> list[Job]:
     ]
 
 
-def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n_jobs: int = -1) -> Iterator[Done]:
+def evaluate(
+    evaluation: Evaluation,
+    folder: str | Path,
+    *,
+    command: str = "",
+    n_jobs: int = -1,
+    on_change: OnChange = "refuse",
+) -> Iterator[Done]:
     """Run what is not there yet; everything that can be wrong with the request is told before anything runs.
 
     Args:
@@ -123,6 +141,8 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
         folder: Gets `episodes/*.npz` and `run.json`.
         command: Kept in `run.json`.
         n_jobs: Processes; -1 for one a core.
+        on_change: What becomes of episodes whose controller was edited since: with "again" they move to `superseded/`
+            and are run anew, with "keep" the edited one runs beside them under a name of its own.
 
     Returns:
         A note of each episode, those already there first. It raises `EvaluationError` after all others have run, if
@@ -131,27 +151,41 @@ def evaluate(evaluation: Evaluation, folder: str | Path, *, command: str = "", n
     Raises:
         FileNotFoundError: If the recording is not there.
         EpisodeError: If an episode of the folder is damaged, or was run with another configuration.
-        ValueError: If the evaluation asks for what does not exist or is not allowed.
+        ChangedError: If a controller has changed and nothing says what becomes of its episodes.
+        ValueError: If the evaluation asks for what does not exist or is not allowed, or a controller that is not built
+            in fails on made-up observations.
     """
     if n_jobs == 0:
         raise ValueError("n_jobs = 0 is not allowed; allowed: integers >= 1, or -1 for one a core")
     folder = Path(folder)
     recording = recording_of(evaluation)
-    for doubt in doubts(recording):
+    for doubt in (*unverified(recording), *doubts(recording)):
         logger.warning("%s: %s", evaluation.dataset, doubt)
-    jobs = jobs_of(evaluation)
-    if len({job.file_name for job in jobs}) < len(jobs):
+    if len({job.file_name for job in jobs_of(evaluation)}) < len(jobs_of(evaluation)):
         raise ValueError(f"controllers {evaluation.controllers} give files of the same name; leave out all but one")
     for scenario in evaluation.scenarios:
         _scenario(evaluation, scenario, evaluation.seed)
-    configurations = _controller_configurations(evaluation.controllers)
-    _check_folder(folder / "episodes", jobs, recording, configurations)
+    named = named_controllers(evaluation.controllers, _scenario(evaluation, evaluation.scenarios[0], evaluation.seed))
+    check_output(folder)
+    found = _changes(evaluation, folder, recording, named)
+    if found and on_change == "keep":
+        evaluation = _versioned(evaluation, found, named)
+        named = named_controllers(
+            evaluation.controllers, _scenario(evaluation, evaluation.scenarios[0], evaluation.seed)
+        )
+        found = _changes(evaluation, folder, recording, named)
+    if found and on_change == "again":
+        for change in found:
+            set_aside(change, folder)
+    elif found:
+        raise ChangedError(found)
+    jobs = jobs_of(evaluation)
     clear_leftovers(folder / "episodes")
     # Episodes of earlier commands belong to the run as well: they are in its tables.
     episodes = sorted(
         {job.file_name for job in jobs} | {path.name for path in finished_files(folder / "episodes", ".npz")}
     )
-    run = {"command": command, "controllers": [*configurations], "episodes": episodes}
+    run = {"command": command, "controllers": [own.name for own in named.values()], "episodes": episodes}
     write_whole(folder / "run.json", (json.dumps(run, indent=1) + "\n").encode())
     return _run_all(jobs, folder / "episodes", n_jobs)
 
@@ -217,50 +251,23 @@ def _scenario(evaluation: Evaluation, name: str, draw: int) -> Scenario:
     return Scenario().changed(**{"share": suite.SHARES[name], **evaluation.task_kwargs, "seed": draw})
 
 
-def _controller_configurations(specs: tuple[str, ...]) -> dict[str, dict[str, Any]]:
-    """Configuration of each controller by the name it goes by in tables, the human row's at the end."""
-    configurations: dict[str, dict[str, Any]] = {}
-    for spec in specs:
-        controller = make_controller(spec)
-        check_name(f"the name of controller {spec!r}", controller.name)
-        if controller.name in (*configurations, HUMAN):
-            raise ValueError(
-                f"controller {spec!r} is named {controller.name!r} like another row of the tables; give it another name"
-            )
-        configurations[controller.name] = controller_config(controller)
-    return {**configurations, HUMAN: {}}
+def _changes(evaluation: Evaluation, folder: Path, recording: Recording, named: dict[str, Named]) -> tuple[Change, ...]:
+    wanted = Wanted(
+        recording=recording_metadata(recording),
+        scenario=lambda task, draw: _scenario(evaluation, task, draw).as_dict(),
+        controllers={own.name: own.configuration for own in named.values()},
+        jobs={job.file_name: (job.scenario, job.draw, named[job.controller].name) for job in jobs_of(evaluation)},
+    )
+    return changes(folder / "episodes", wanted)
 
 
-def _check_folder(
-    folder: Path, jobs: list[Job], recording: Recording, configurations: dict[str, dict[str, Any]]
-) -> None:
-    """A folder holds one recording and one configuration: what is there has to agree with what is asked for."""
-    job_of = {job.file_name: job for job in jobs}
-    for path in finished_files(folder, ".npz"):
-        metadata = read_header(path)["metadata"]
-        try:
-            job, found = job_of.get(path.name), metadata["scenario"]
-            name, draw = (job.scenario, job.draw) if job else (metadata["scenario_name"], metadata["draw"])
-            scenario = _scenario(jobs[0].evaluation, name, draw)
-            pairs: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-                "recording": (recording_metadata(recording), metadata["recording"]),
-                "scenario": (scenario.as_dict(), found),
-            }
-            if metadata["controller"] in configurations:
-                wanted = configurations[metadata["controller"]]
-                pairs["controller_config"] = (wanted, metadata["controller_config"])
-        except (KeyError, TypeError) as error:
-            raise EpisodeError(f"{path} was not run by an evaluation: its metadata lack {error}") from error
-        for key, (wanted, given) in pairs.items():
-            _check_same(path, key, wanted, given)
-
-
-def _check_same(path: Path, key: str, wanted: Any, found: Any) -> None:
-    if isinstance(wanted, dict) and isinstance(found, dict):
-        for name in (*wanted, *(name for name in found if name not in wanted)):
-            _check_same(path, f"{key}.{name}", wanted.get(name), found.get(name))
-    elif wanted != found:
-        raise EpisodeError(
-            f"{path} was run with {key} = {found!r}, but {wanted!r} is asked for; "
-            "choose another output folder, or delete the file to have it run again"
-        )
+def _versioned(evaluation: Evaluation, found: tuple[Change, ...], named: dict[str, Named]) -> Evaluation:
+    """The evaluation with names of their own for controllers that have changed."""
+    changed = {change.controller for change in found}
+    specs = tuple(
+        f"{name_of_version(named[spec].name, named[spec].configuration)}={split_label(spec)[1]}"
+        if named[spec].name in changed
+        else spec
+        for spec in evaluation.controllers
+    )
+    return replace(evaluation, controllers=specs)

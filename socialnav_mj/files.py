@@ -46,6 +46,26 @@ def written_whole(path: str | Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def check_output(folder: str | Path) -> None:
+    """Refuse a folder that cannot be written to, before the work that is to end there.
+
+    Args:
+        folder: It need not be there.
+
+    Raises:
+        ValueError: If it, or what it would be in, is a file.
+        PermissionError: If nothing can be written there.
+    """
+    folder = Path(folder)
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise ValueError(
+            f"output folder {str(folder)!r} is not allowed: {there} is a file; allowed: a folder, or a new name"
+        )
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise PermissionError(f"output folder {str(folder)!r} is not allowed: nothing can be written to {there}")
+
+
 def finished_files(folder: str | Path, suffix: str) -> list[Path]:
     """Files of a folder that are whole: not those that `written_whole` is writing, or that an interruption left.
 

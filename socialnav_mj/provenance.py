@@ -3,6 +3,7 @@
 import hashlib
 import os
 import platform
+import re
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -14,6 +15,7 @@ from socialnav_mj.recordings import Recording
 
 PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "scipy")
 """Whose versions travel in every result."""
+_DIGEST = re.compile("[0-9a-f]{64}")
 
 
 def state_hash(*arrays: Array) -> str:
@@ -68,6 +70,29 @@ def recording_metadata(recording: Recording) -> dict[str, Any]:
         "frame_rate": recording.frame_rate,
         "reading": dict(recording.reading),
     }
+
+
+def differences(then: Any, now: Any, key: str = "") -> tuple[str, ...]:
+    """What sets two configurations apart.
+
+    Args:
+        then: JSON values.
+        now: JSON values.
+        key: What they are, which comes before each name.
+
+    Returns:
+        Such as "margin = 0.5, but 0.25", one for each value that differs; digests are cut to what tells them apart.
+    """
+    if isinstance(then, dict) and isinstance(now, dict):
+        found: tuple[str, ...] = ()
+        for name in (*now, *(name for name in then if name not in now)):
+            found += differences(then.get(name), now.get(name), f"{key}.{name}" if key else name)
+        return found
+    return () if then == now else (f"{key} = {_shown(then)}, but {_shown(now)}",)
+
+
+def _shown(value: Any) -> str:
+    return value[:8] if isinstance(value, str) and _DIGEST.fullmatch(value) else repr(value)
 
 
 def platform_facts() -> dict[str, str]:

@@ -42,6 +42,7 @@ def rollout(
     """
     task, physics = environment.task, environment.physics
     scenario: Scenario = task.scenario
+    configuration = controller_config(controller)  # before anything adds to its attributes
     controller.reset(Limits.of(scenario), seed=scenario.seed)
     recorder = Recorder(task)
     digest = hashlib.sha256()
@@ -63,7 +64,7 @@ def rollout(
             task.recording,
             scenario,
             controller=controller.name,
-            controller_config=controller_config(controller),
+            controller_config=configuration,
             scenario_name=scenario_name,
             steps=task.step,
             state_hash=digest.hexdigest(),

@@ -13,7 +13,7 @@ import pyarrow.parquet
 from socialnav_mj.episode import Episode
 from socialnav_mj.files import finished_files
 from socialnav_mj.processes import in_processes
-from socialnav_mj.provenance import package_versions, platform_facts
+from socialnav_mj.provenance import differences, package_versions, platform_facts
 from socialnav_mj.recordings import DEFAULT_READING, Reading
 from socialnav_mj.report.run_file import RUN_FILE, read_run_file
 from socialnav_mj.report.writer import report_tables
@@ -146,8 +146,8 @@ def _other_versions(metadata: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _differing_metadata(stored: dict[str, Any], again: dict[str, Any]) -> tuple[str, ...]:
-    names = [name for name in {**stored, **again} if name not in _TOLD and stored.get(name) != again.get(name)]
-    return tuple(f"{name} is {_short(stored.get(name))}, now {_short(again.get(name))}" for name in names)
+    names = [name for name in {**stored, **again} if name not in _TOLD]
+    return tuple(text for name in names for text in differences(stored.get(name), again.get(name), name))
 
 
 def _short(value: object) -> str:

@@ -38,7 +38,7 @@ ROWS = (
     {"suite"},
     {"tasks"},
     {"controllers"},
-    {"recorder", "rollout", "human", "evaluation"},
+    {"recorder", "rollout", "human", "resumption", "evaluation"},
     {"metrics"},
     {"trace"},
     {"report"},

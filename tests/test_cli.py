@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import importlib
 import json
 import os
 import re
@@ -67,7 +68,7 @@ def test_command_of_the_issue_is_accepted(capsys, monkeypatch):
 
     asked = []
 
-    def note(evaluation, out, *, command, n_jobs):
+    def note(evaluation, out, *, command, n_jobs, on_change):
         asked.append((evaluation, str(out), n_jobs))
         raise ValueError("that will do")
 
@@ -171,11 +172,12 @@ def test_everything_that_can_be_set_is_an_option_that_says_what_it_is(capsys, mo
 
 def test_failing_controller_is_told_once_and_the_others_are_kept(capsys):
     Path("mine.py").write_text(
-        "class Failing:\n    name = 'failing'\n    def reset(self, limits, *, seed=0): pass\n"
-        "    def act(self, observation): return observation['nothing']\n"
+        "class Failing:\n    name = 'failing'\n    def reset(self, limits, *, seed=0): self.steps = 0\n"
+        "    def act(self, observation):\n        self.steps += 1\n"
+        "        return observation['nothing' if self.steps > 9 else 'goal'] * 0.0\n"
     )
     errors = fails(capsys, *QUICK, "--out", "o", "--controllers", "go_straight", "mine:Failing")
-    assert errors.count("KeyError: 'nothing'") == 1 and "mine.py:4" in errors
+    assert errors.count("KeyError: 'nothing'") == 1 and "mine.py:6" in errors
     assert "1 of 3 episodes failed, the others are kept; the same command runs the failed ones again" in errors
     assert len(list(Path("o/episodes").iterdir())) == 2
 
@@ -198,6 +200,11 @@ def test_failing_controller_is_told_once_and_the_others_are_kept(capsys):
         ([*QUICK, "--control-timestep", "100"], "control_timestep = 100.0 is not allowed; allowed: at most 1,"),
         ([*QUICK, "--control-timestep", "0.013"], "control_timestep = 0.013 is not allowed"),
         ([*QUICK, "--turn-limit", "none"], "invalid choice 'none' for argument '--turn-limit'"),
+        ([*QUICK, "--out", TINY], f"output folder {TINY!r} is not allowed: {TINY} is a file; allowed: a folder"),
+        ([*QUICK, "--out", f"{TINY}/x"], f"{TINY} is a file"),
+        (["train", "replay-irl", "--out", TINY], f"{TINY} is a file"),
+        (["train", "replay-irl", "--scene-steps", "0"], "scene_steps = 0 is not allowed"),
+        ([*QUICK, "--again", "--keep"], "--again and --keep are both given"),
         (["report", "nowhere"], "error: no episodes in nowhere/episodes; expected *.npz files"),
         (["data", "info", "nowhere"], "no recording 'nowhere'"),
         (["data", "fetch", "nowhere"], "unknown recording 'nowhere'; available: "),
@@ -301,6 +308,92 @@ def test_killed_command_leaves_no_process_and_no_file_changes_any_more():
     assert {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()} == left
 
 
+SPIN = """
+class Spin:
+    name = "spin"
+
+    def __init__(self, margin=0.5):
+        self.margin = margin
+
+    def reset(self, limits, *, seed=0):
+        self.limits = limits
+
+    def act(self, observation):
+        return observation["goal"] * self.margin
+"""
+
+
+def run_spin(*options, source=SPIN, spec="mine:Spin"):
+    """As the next process runs it: the module is read anew."""
+    Path("mine.py").write_text(source)
+    sys.modules.pop("mine", None)
+    importlib.invalidate_caches()
+    main([*QUICK, "--out", "o", "--controllers", spec, *options])
+
+
+def spun():
+    """Name: SHA-256 of the states of each episode."""
+    headers = [read_header(path)["metadata"] for path in sorted(Path("o/episodes").glob("*.npz"))]
+    return {metadata["controller"]: metadata["state_hash"] for metadata in headers}
+
+
+def test_edited_controller_is_told_before_anything_runs_and_run_anew_or_kept(capsys):
+    edited = SPIN.replace("* self.margin", "* 2.0 * self.margin")
+    run_spin()
+    before, report = spun(), Path("o/report.md").read_bytes()
+    for change in ({"source": edited}, {"source": SPIN.replace("margin=0.5", "margin=0.25")}):
+        with pytest.raises(SystemExit) as end:
+            run_spin(**change)
+        told = capsys.readouterr().err
+        assert end.value.code == 2 and "spin has changed since these episodes were run" in told
+        assert "--again runs them anew, --keep keeps both" in told and "in mine.py = " in told
+    assert "margin = 0.5, but 0.25" in told
+    assert (spun(), Path("o/report.md").read_bytes()) == (before, report)
+
+    run_spin("--keep", source=edited)
+    both = spun()
+    (new,) = both.keys() - before.keys()
+    assert re.fullmatch("spin@[0-9a-f]{6}", new) and both["spin"] == before["spin"] != both[new]
+    text = Path("o/report.md").read_text()
+    assert "differs from" in text and "in mine.py = " in text and new in text
+    run_spin("--keep", source=edited)
+    assert spun() == both
+    with pytest.raises(SystemExit):
+        main(["verify", "o", "--dataset", TINY, "--trust", "mine:Spin", "--jobs", "1"])
+    told = capsys.readouterr().out
+    assert "11 of 13 files say" in told and "DIFFERS: controller_config.sources.mine:Spin in mine.py = " in told
+
+    (kept,) = Path("o/episodes").glob("*spin-*.npz")
+    kept.unlink()
+    run_spin("--again", source=edited)
+    assert spun() == {"spin": both[new], "human": before["human"]}
+    (aside,) = Path("o/superseded").rglob("*.npz")
+    assert read_header(aside)["metadata"]["state_hash"] == before["spin"]
+    run_spin(source=edited)
+
+
+def test_controller_renamed_in_its_source_is_not_taken_for_the_old_one(capsys):
+    run_spin()
+    with pytest.raises(SystemExit):
+        run_spin(source=SPIN.replace('name = "spin"', 'name = "other"'))
+    assert "other has changed" in capsys.readouterr().err
+
+
+def test_slip_in_a_controller_is_found_before_anything_runs(capsys):
+    with pytest.raises(SystemExit):
+        run_spin(source=SPIN.replace("observation", "obsrvation", 1).replace("self.limits = limits", "pass"))
+    told = capsys.readouterr().err
+    assert "controller 'spin', tried before anything is run, fails in the empty scene: NameError" in told
+    assert "mine.py:12" in told and not Path("o").exists()
+
+
+def test_settings_of_one_class_stand_in_one_table_under_their_names():
+    Path("mine.py").write_text(SPIN)
+    sys.modules.pop("mine", None)
+    main([*QUICK, "--out", "o", "--controllers", "mine:Spin", "mine:Spin(margin=1)", "fast=mine:Spin(margin=2)"])
+    assert set(spun()) == {"spin", "mine:Spin(margin=1)", "fast", "human"}
+
+
 def test_version_is_that_of_the_package(capsys):
     main(["--version"])
     assert capsys.readouterr().out == f"socialnav-mj {version('socialnav-mj')}\n"
@@ -314,6 +407,7 @@ def test_list_shows_tasks_controllers_and_recordings(capsys):
     output = capsys.readouterr().out
     for name in ("scenario_1", "10%", "scenario_4", "90%", "potential_field", "go_straight", "package.module:Class"):
         assert name in output
+    assert "switch_distance=2.0" in output and "preset='social'" in output and "attraction_limit=None" in output
     assert "plaza" in output and "students003" in output and max(map(len, output.splitlines())) <= 80
 
 
@@ -335,6 +429,19 @@ def test_data_info_shows_the_facts_of_any_recording(capsys):
     assert "0.25/0.32/0.4 m" in output
     assert "recording tiny, variant text: 3 people, 7.6 s, frame rate 25 Hz (assumed); --frame-rate sets" in output
     assert f"checksum {hashlib.sha256(Path(TINY).read_bytes()).hexdigest()}" in output
+
+
+def test_simulated_crowd_is_called_so_wherever_it_is_named(capsys):
+    main(["data", "info", "plaza", "--until", "4"])
+    assert "simulated crowd plaza, variant vsp: " in capsys.readouterr().out
+    main([*QUICK[:2], "plaza", *QUICK[3:], "--until", "4", "--controllers", "go_straight", "--out", "o"])
+    shown = capsys.readouterr()
+    assert "plaza (vsp, simulated crowd), scenario_1" in " ".join(shown.out.split())
+    report = Path("o/report.md").read_text()
+    assert "## plaza (vsp, simulated crowd), scenario\\_1" in report or "simulated crowd), scenario_1" in report
+    assert "**human**: the simulated people themselves" in report and "recorded people" not in report
+    main(["verify", "o", "--jobs", "1"])
+    assert read_header(next(Path("o/episodes").glob("*.npz")))["metadata"]["recording"]["reading"] == {"until": 4.0}
 
 
 def test_data_fetch_downloads_into_the_folder_that_is_given(capsys, tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import tyro
 from rich.table import Table
+from rich.text import Text
 
 from socialnav_mj.cli.arguments import Folder, Name
 from socialnav_mj.cli.console import console, errors, say
@@ -19,17 +20,21 @@ class List:
     def run(self) -> None:
         """Print a table each of tasks, controllers and recordings."""
         from socialnav_mj import suite
-        from socialnav_mj.controllers import available
+        from socialnav_mj.controllers import available, described_settings, factory_of
         from socialnav_mj.recordings.catalogue import catalogue
 
         table = Table("task", "replaced", title="tasks", title_justify="left")
         for name in suite.ALL_TASKS:
             table.add_row(name, f"{suite.SHARES[name]:.0%}")
         console.print(table)
-        table = Table("controller", title="controllers", title_justify="left")
+        table = Table("controller", "settings and their defaults", title="controllers", title_justify="left")
         for name in available():
-            table.add_row(name)
-        table.add_row("package.module:Class")
+            try:
+                settings = described_settings(factory_of(name))
+            except ValueError as error:  # an installed package offers what cannot be imported
+                settings = str(error)
+            table.add_row(name, Text(settings or "none"))
+        table.add_row("package.module:Class", "its arguments, as in mine:Spin(margin=0.5)")
         console.print(table)
         table = Table("recording", "variants", "what it is", title="recordings", title_justify="left")
         for name, row in catalogue().items():
@@ -46,7 +51,7 @@ class DataList:
 
     def run(self) -> None:
         """Print a table for each recording, and whether its default variant is here and has the right sha256."""
-        from socialnav_mj.recordings.catalogue import catalogue, load_recording
+        from socialnav_mj.recordings.catalogue import UNKNOWN, catalogue, load_recording
 
         for name, row in catalogue().items():
             table = Table(show_header=False, title=f"{name}: {row.title}", title_justify="left")
@@ -57,9 +62,10 @@ class DataList:
             table.add_row("frame rate", f"{row.frame_rate:g} Hz")
             for variant, files in row.variants.items():
                 for file, checksum in files.items():
-                    table.add_row(f"{variant}: {file}", f"sha256 {checksum}")
+                    known = "not verified: no sha256 is known" if checksum == UNKNOWN else f"sha256 {checksum}"
+                    table.add_row(f"{variant}: {file}", known)
             try:
-                load_recording(name, data_dir=self.data_dir)
+                load_recording(name, data_dir=self.data_dir, warn=False)
                 table.add_row("here", "yes")
             except FileNotFoundError:
                 table.add_row("here", f"no: socialnav-mj data fetch {name}")
@@ -98,15 +104,20 @@ class DataFetch:
     """Name in the catalogue."""
     data_dir: Folder = None
     """Where to put it; the user cache by default."""
+    accept_unverified: bool = False
+    """Take files of which the catalogue knows no sha256."""
 
     def run(self) -> None:
-        """Download what is not there yet, and print the paths."""
+        """Download what is not there yet, and print the paths, and the sha256 of what could not be verified."""
+        from socialnav_mj.recordings.catalogue import UNKNOWN, catalogue_row
         from socialnav_mj.recordings.fetch import fetch
+        from socialnav_mj.recordings.readers import sha256
 
         with errors.status(f"downloading {self.name}"):
-            paths = fetch(self.name, data_dir=self.data_dir)
+            paths = fetch(self.name, data_dir=self.data_dir, accept_unverified=self.accept_unverified)
+        sums = {file: digest for own in catalogue_row(self.name).variants.values() for file, digest in own.items()}
         for path in paths:
-            say(str(path))
+            say(f"{path} (not verified, sha256 {sha256([path])})" if sums.get(path.name) == UNKNOWN else str(path))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ import shlex
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from rich.table import Table
@@ -47,6 +47,10 @@ class Evaluate:
     """Processes; -1 for one a core."""
     out: Folder = None
     """Folder of the results; runs/DATASET by default."""
+    again: bool = False
+    """Run episodes anew whose controller was edited since; the old ones move to superseded/."""
+    keep: bool = False
+    """Keep them, and run the edited controller beside them under a name of its own."""
     settings: Annotated[object, tyro.conf.arg(constructor=Settings)] = field(default_factory=Settings)
     """Settings of every scenario that is run."""
 
@@ -56,7 +60,10 @@ class Evaluate:
         from socialnav_mj.controllers import with_policy_of
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of, recording_of
         from socialnav_mj.report.writer import write_report
+        from socialnav_mj.resumption import ChangedError
 
+        if self.again and self.keep:
+            raise ValueError("--again and --keep are both given; give one")
         evaluation = Evaluation(
             dataset=self.dataset,
             variant=self.variant,
@@ -70,7 +77,11 @@ class Evaluate:
         )
         out = self.out or Path("runs") / Path(self.dataset).resolve().stem
         say(describe(recording_of(evaluation)), errors)
-        episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs)
+        on_change: Any = "again" if self.again else "keep" if self.keep else "refuse"
+        try:
+            episodes = evaluate(evaluation, out, command=shlex.join(sys.argv), n_jobs=self.jobs, on_change=on_change)
+        except ChangedError as error:
+            raise ValueError(f"{error.told}; --again runs them anew, --keep keeps both") from error
         follow(episodes, jobs_of(evaluation))
         with errors.status("tables and traces"):
             report = write_report(out, n_jobs=self.jobs)

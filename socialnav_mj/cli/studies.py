@@ -10,6 +10,7 @@ from socialnav_mj.cli.arguments import Folder, Scenarios
 from socialnav_mj.cli.console import counted_progress, say
 from socialnav_mj.cli.settings import TrainingSettings
 from socialnav_mj.cli.study import run_study
+from socialnav_mj.files import check_output
 from socialnav_mj.learning.config import TrainingConfig
 
 
@@ -40,6 +41,7 @@ class Train:
         config = TrainingConfig(datasets=self.dataset, **vars(self.settings))
         label = "+".join(Path(name).stem for name in self.dataset)
         out = self.out or Path("runs") / "train" / f"{label}_{config.features}_seed{config.seed}"
+        check_output(out)
         with counted_progress() as progress:
             bar = progress.add_task("scene steps", total=config.scene_steps)
 

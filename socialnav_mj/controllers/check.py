@@ -1,5 +1,6 @@
 """Whether a controller keeps the protocol, tried on made-up observations without a simulator."""
 
+import traceback
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,6 +12,10 @@ from socialnav_mj.geometry import Array
 from socialnav_mj.observation import observe
 
 
+class ProtocolError(ValueError):
+    """A controller does not keep the protocol; says how, and in which scene."""
+
+
 def check_controller(controller: Controller, *, seed: int = 0) -> None:
     """Run a controller on observations of an empty, a lonely, a crowded and a degenerate scene.
 
@@ -19,11 +24,11 @@ def check_controller(controller: Controller, *, seed: int = 0) -> None:
         seed: Seed of the made-up scenes, and the one that `reset` is given.
 
     Raises:
-        ValueError: If something is wrong; says what, in which scene, and what is expected.
+        ProtocolError: If something is wrong; says what, in which scene, and what is expected.
     """
     limits = Limits.of(Scenario())
     if not isinstance(controller, Controller) or not isinstance(controller.name, str) or not controller.name:
-        raise ValueError(f"{type(controller).__name__} lacks reset, act, or a name that is a string and not empty")
+        raise ProtocolError(f"{type(controller).__name__} lacks reset, act, or a name that is a string and not empty")
     controller_config(controller)
     actions = []
     for _ in range(2):
@@ -31,7 +36,33 @@ def check_controller(controller: Controller, *, seed: int = 0) -> None:
         actions.append([_checked_action(controller, scene, seen) for scene, seen in _scenes(seed)])
     for (scene, _), one, two in zip(_scenes(seed), *actions, strict=True):
         if not np.array_equal(one, two):
-            raise ValueError(f"in the {scene} scene, after a reset with the same seed, act returns something else")
+            raise ProtocolError(f"in the {scene} scene, after a reset with the same seed, act returns something else")
+
+
+def try_controller(controller: Controller, scenario: Scenario) -> None:
+    """Run a controller once on made-up observations, so that a slip in it is found before anything is simulated.
+
+    Args:
+        controller: As it would be evaluated; it is reset.
+        scenario: Whose limits it is given.
+
+    Raises:
+        ValueError: If it fails, or returns no finite wheel speeds; says where.
+    """
+    scene = "empty"
+    try:
+        controller.reset(Limits.of(scenario), seed=scenario.seed)
+        for scene, seen in _scenes(scenario.seed):
+            if scene != "degenerate":
+                _checked_action(controller, scene, seen)
+    except ProtocolError as error:
+        raise ValueError(f"controller {controller.name!r}, tried before anything is run: {error}") from error
+    except Exception as error:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        raise ValueError(
+            f"controller {controller.name!r}, tried before anything is run, fails in the {scene} scene: "
+            f"{type(error).__name__}: {error} ({frame.filename}:{frame.lineno})"
+        ) from error
 
 
 def _checked_action(controller: Controller, scene: str, observation: Observation) -> Array:
@@ -42,21 +73,25 @@ def _checked_action(controller: Controller, scene: str, observation: Observation
     try:
         action = np.array(returned, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(
+        raise ProtocolError(
             f"in the {scene} scene, act returns a {type(returned).__name__}; expected an array of shape {shape}"
         ) from None
     if action.shape != shape:
-        raise ValueError(f"in the {scene} scene, act returns shape {action.shape}; expected {shape}: (left, right)")
+        raise ProtocolError(f"in the {scene} scene, act returns shape {action.shape}; expected {shape}: (left, right)")
     if not np.isfinite(action[active]).all():
-        raise ValueError(f"in the {scene} scene, act returns {action[active].tolist()}; expected finite wheel speeds")
+        raise ProtocolError(
+            f"in the {scene} scene, act returns {action[active].tolist()}; expected finite wheel speeds"
+        )
     if changed := [key for key, value in observation.items() if not np.array_equal(value, given[key])]:
-        raise ValueError(f"in the {scene} scene, act changes observation[{changed[0]!r}]; expected it to be only read")
+        raise ProtocolError(
+            f"in the {scene} scene, act changes observation[{changed[0]!r}]; expected it to be only read"
+        )
     policies = tuple(getattr(controller, "policies", (controller.name,)))
     policy = getattr(controller, "active_policy", None)
     if policy is not None and (
         np.shape(policy) != shape[:1] or not np.isin(np.asarray(policy)[active], np.arange(len(policies))).all()
     ):
-        raise ValueError(
+        raise ProtocolError(
             f"in the {scene} scene, active_policy is {policy}; expected shape {shape[:1]} with indices into {policies}"
         )
     action[~active] = 0.0

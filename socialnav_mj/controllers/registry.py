@@ -1,10 +1,9 @@
 """Controllers by name: the built-in ones, those of installed packages, and any class by its path."""
 
 import ast
-import inspect
 import re
 from collections.abc import Callable
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
 from operator import attrgetter
@@ -77,9 +76,8 @@ def make_controller(spec: str) -> Controller:
     factory = factory_of(name)
     allowed = parameters_of(factory)
     if unknown := [key for key in config if allowed is not None and key not in {*allowed, "name"}]:
-        raise ValueError(
-            f"controller {name!r} has no setting {unknown[0]!r}; its settings: {described_settings(factory) or 'none'}"
-        )
+        known = ", ".join(key for key in allowed or () if key != "name")
+        raise ValueError(f"controller {name!r} has no setting {unknown[0]!r}; its settings: {known or 'none'}")
     if label is not None:
         config["name"] = label
     elif config:
@@ -271,24 +269,3 @@ def parts_of(kind: Callable[..., Controller]) -> tuple[str, ...]:
         Names of the fields that are marked with `IS_CONTROLLER`.
     """
     return tuple(field.name for field in settings_of(kind) if field.metadata.get(IS_CONTROLLER))
-
-
-def described_settings(factory: Callable[..., Controller]) -> str:
-    """The settings of a controller with their defaults.
-
-    Args:
-        factory: What `factory_of` returns.
-
-    Returns:
-        Such as "margin=0.1, horizon=3.0"; a setting without a default as its name alone, and parts by their names.
-    """
-    own = {field.name: field for field in settings_of(factory)}
-    shown = []
-    for name, default in (parameters_of(factory) or {}).items():
-        field = own.get(name)
-        if field is not None and field.default_factory is not MISSING:
-            part = field.default_factory()
-            default = [p.name for p in part] if isinstance(part, tuple) else getattr(part, "name", part)
-        if name != "name":
-            shown.append(name if default is inspect.Parameter.empty else f"{name}={default!r}")
-    return ", ".join(shown)

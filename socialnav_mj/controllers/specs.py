@@ -1,8 +1,9 @@
 """Controllers as text and as JSON values, and back: what travels in episodes, and what a file may have made."""
 
+import inspect
 import json
 from collections.abc import Callable, Collection
-from dataclasses import is_dataclass
+from dataclasses import MISSING, is_dataclass
 from functools import partial
 from importlib.metadata import entry_points
 from typing import Any, get_type_hints
@@ -238,3 +239,24 @@ def _untrusted(path: str) -> str:
         f"the file names the controller {path!r}, which is neither built in nor offered by an installed package; "
         f"importing it runs its code. If you trust that code, add --trust {path}"
     )
+
+
+def described_settings(factory: Callable[..., Controller]) -> str:
+    """The settings of a controller with their defaults.
+
+    Args:
+        factory: What `factory_of` returns.
+
+    Returns:
+        Such as "margin=0.1, horizon=3.0"; a setting without a default as its name alone, and parts as specs.
+    """
+    own = {field.name: field for field in settings_of(factory)}
+    shown = []
+    for name, default in (parameters_of(factory) or {}).items():
+        field = own.get(name)
+        if field is not None and field.default_factory is not MISSING:
+            part = field.default_factory()
+            default = _each(part, spec_of) if name in parts_of(factory) else part
+        if name != "name":
+            shown.append(name if default is inspect.Parameter.empty else f"{name}={default!r}")
+    return ", ".join(shown)

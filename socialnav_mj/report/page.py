@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
+from socialnav_mj.provenance import differences
+from socialnav_mj.recordings.known import crowd_of, is_simulated
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, Estimate
 from socialnav_mj.report.intervals import LEAST, ONE_RECORDING
@@ -35,7 +37,7 @@ share, it stands in place of the error. {ONE_RECORDING} Controllers that share d
 them draw by draw (`agents.parquet`). All other measures, defined in docs/metrics.md, are in `summary.csv`; every \
 collision is a row of `tables/collisions.parquet`.
 
-- **human**: the recorded people themselves, each on its own track instead of the agent that replaced it, scored by \
+- **human**: the {{people}} themselves, each on its own track instead of the agent that replaced it, scored by \
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
 - **success**: arrived, and had no collision on the way, whoever was at fault; over all agents.
 - **success if ghosts count**: a person whose track begins on a robot passes through it as a ghost until clear, which \
@@ -77,7 +79,10 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
             for g in summary["groups"]
             if (g["dataset"], g["variant"], g["scenario"]) == (dataset, variant, scenario)
         )
-        lines += [f"## {plain(f'{dataset} ({variant}), {scenario}')}: {100 * share:g} % of the people replaced", ""]
+        lines += [
+            f"## {plain(f'{crowd_of(dataset, variant)}, {scenario}')}: {100 * share:g} % of the people replaced",
+            "",
+        ]
         lines += head([*headings, "draws", "agents"])
         for controller, own in rows:
             cells = [with_error(own[measure.name], measure.digits) for measure in shown]
@@ -87,8 +92,14 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
             )
         lines.append("")
     lines += sections
-    lines += ["## How to read it", "", _HOW_TO_READ, *_traceability(summary)]
+    lines += ["## How to read it", "", _HOW_TO_READ.replace("{people}", _people(summary)), *_traceability(summary)]
     return "\n".join(lines) + "\n"
+
+
+def _people(summary: dict[str, Any]) -> str:
+    """Whose tracks the human row is of."""
+    simulated = {is_simulated(r["name"], r["variant"]) for r in summary["recordings"]}
+    return " and ".join(f"{'simulated' if each else 'recorded'} people" for each in sorted(simulated))
 
 
 def _traceability(summary: dict[str, Any]) -> list[str]:
@@ -107,11 +118,32 @@ def _traceability(summary: dict[str, Any]) -> list[str]:
     lines += [
         f"- {plain(name)}: {code(json.dumps(value, sort_keys=True))}" for name, value in sorted(configurations.items())
     ]
+    lines += _what_differs(summary)
     lines += ["", "Episodes:", "", *head(["file", "draw", "state hash"])]
     lines += [
         row([e["file"], str(e["draw"]), e["state_hash"]]) for group in summary["groups"] for e in group["episodes"]
     ]
     return lines
+
+
+def _what_differs(summary: dict[str, Any]) -> list[str]:
+    """Controllers of one class beside the first of them: other settings, or another state of its source."""
+    by_name = {group["controller"]: group["controller_configuration"] for group in summary["groups"]}
+    first: dict[str, str] = {}
+    lines = []
+    for name, configuration in by_name.items():
+        model = first.setdefault(str(configuration.get("class", name)), name)
+        if other := [text for text in differences(by_name[model], configuration) if not text.startswith(_NAMES)]:
+            lines.append(f"- {plain(name)} differs from {plain(model)}: {code('; '.join(other))}")
+    return (
+        ["", "What differs between controllers of one class (value of the latter, but of the former):", "", *lines]
+        if lines
+        else []
+    )
+
+
+_NAMES = ("name = ", "attributes.name = ", "attributes = ")
+"""Differences that the rows' names say already."""
 
 
 def by_scenario(

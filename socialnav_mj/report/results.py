@@ -1,6 +1,5 @@
 """The episodes of a run -> one table with a row for every agent, and what else its tables are made of."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from socialnav_mj.files import finished_files
 from socialnav_mj.metrics.metric import Metric
 from socialnav_mj.metrics.registry import METRICS
 from socialnav_mj.processes import in_processes
+from socialnav_mj.provenance import differences
 from socialnav_mj.report.agents import Source, scenario_configuration
 from socialnav_mj.report.paired import HUMAN, pair_with_humans
 from socialnav_mj.report.scores import Scores, clear_old_scores, score, score_once
@@ -114,8 +114,8 @@ def _check_comparable(sources: Sequence[Source]) -> None:
             ((dataset, variant, "recording", ""), source.metadata["recording"]),
         ):
             model, expected = first.setdefault(key, (source, configuration))
-            if json.dumps(configuration, sort_keys=True) != json.dumps(expected, sort_keys=True):
+            if other := differences(expected, configuration):
                 raise EpisodeError(
                     f"{model.file} and {source.file} have different configurations of {' / '.join(key).rstrip(' /')}: "
-                    f"{expected} and {configuration}; put them in different folders"
+                    f"{'; '.join(other)}; put them in different folders"
                 )
