@@ -16,12 +16,21 @@ import numpy as np
 import pytest
 
 from socialnav_mj.recordings import catalogue as module
+from socialnav_mj.recordings import fetch as fetch_module
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.recordings.catalogue import CatalogueRow, catalogue, catalogue_row, read_catalogue
+from socialnav_mj.recordings.catalogue import UNKNOWN, CatalogueRow, catalogue, catalogue_row, read_catalogue
 from socialnav_mj.recordings.fetch import FetchError, fetch, fetch_row
 from socialnav_mj.recordings.fields import FormatError
+from socialnav_mj.recordings.known import crowd_of, is_simulated, unverified
 from socialnav_mj.resources import data_folder
 
+UNVERIFIED = {
+    "zara03": {"annotation.vsp", "H.txt"},
+    "students001": {"annotation.vsp"},
+    "eth": {"obsmat.txt"},
+    "hotel": {"obsmat.txt"},
+}
+"""Recording: files whose sha256 could not be had."""
 CONTENT = b"0 1 0 0\n10 1 1 0\n" * 1000
 needs_ucy = pytest.mark.skipif(
     not os.environ.get("SOCIALNAV_MJ_DATA"), reason="needs the UCY recordings: SOCIALNAV_MJ_DATA is not set"
@@ -70,12 +79,22 @@ def files_below(folder: Path) -> list[Path]:
 
 
 def test_catalogue_says_all_that_is_needed_of_each_recording() -> None:
-    assert {"plaza", "students003", "zara01", "zara02"} == set(catalogue())
+    assert {"plaza", "students003", "zara01", "zara02"} | UNVERIFIED.keys() == set(catalogue())
+    assert {name for name, row in catalogue().items() if row.simulated} == {"plaza"}
     for row in catalogue().values():
         assert row.source and row.licence and row.scale and row.frame_rate > 0.0 and row.axis_order in ("xy", "yx")
         assert row.url is None or (row.url.startswith("https://") and row.url.endswith("/"))
         for files in row.variants.values():
-            assert all(len(digest) == 64 for digest in files.values())
+            unknown = {file for file, digest in files.items() if digest == UNKNOWN}
+            assert all(len(digest) == 64 for digest in files.values() if digest != UNKNOWN)
+            assert unknown == UNVERIFIED.get(row.name, set())
+    assert (catalogue_row("eth").frame_rate, catalogue_row("hotel").frame_rate) == (15.0, 25.0)
+    # The homography of students001 is that of students003, from its folder.
+    one, three = catalogue_row("students001"), catalogue_row("students003")
+    assert (
+        one.address("H.txt") == three.address("H.txt") and one.address("annotation.vsp") == f"{one.url}annotation.vsp"
+    )
+    assert one.variants["vsp"]["H.txt"] == three.variants["vsp"]["H.txt"]
 
 
 @pytest.mark.parametrize(
@@ -271,3 +290,31 @@ def test_folder_given_by_path_is_known_by_its_checksum() -> None:
     by_path, by_name = load_recording(folder), load_recording("zara01")
     assert by_path.checksum == by_name.checksum
     assert (by_path.end == by_name.end).all()
+
+
+def test_files_without_a_known_checksum_are_never_taken_silently(
+    server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    row = dataclasses.replace(row_of(server, digest=UNKNOWN), name="made", frame_rate=25.0)
+    known = hashlib.sha256(CONTENT).hexdigest()
+    elsewhere = dataclasses.replace(row, url="https://nowhere.invalid/", elsewhere={"a.txt": f"{server}there/a.txt"})
+    for own in (module, fetch_module):
+        monkeypatch.setattr(own, "catalogue", lambda: {"made": elsewhere})
+    with pytest.raises(FetchError, match=r"knows no sha256 of a\.txt of recording 'made'.*--accept-unverified"):
+        fetch("made", data_dir=tmp_path)
+    assert not files_below(tmp_path)
+    (path,) = fetch("made", data_dir=tmp_path, accept_unverified=True)
+    path.write_bytes(b"0 1 0 0\n10 1 1 0\n")
+    again = hashlib.sha256(path.read_bytes()).hexdigest()
+    assert fetch("made", data_dir=tmp_path, accept_unverified=True) == (path,)  # what is there is kept
+    assert load_recording("made", data_dir=tmp_path).checksum == again != known
+    (told,) = [record.getMessage() for record in caplog.records if "not verified" in record.getMessage()]
+    assert "the catalogue knows no sha256 of a.txt" in told and again in told
+
+
+def test_only_simulated_people_are_called_so(tmp_path: Path) -> None:
+    plaza = load_recording("plaza")
+    assert is_simulated("plaza", "vsp") and not is_simulated("plaza", "text") and not is_simulated("zara01", "vsp")
+    assert crowd_of("plaza", "vsp") == "plaza (vsp, simulated crowd)" and crowd_of("zara01", "vsp") == "zara01 (vsp)"
+    assert unverified(plaza) == ()
+    assert unverified(dataclasses.replace(plaza, name="eth", variant="obsmat"))[0].startswith("not verified")

@@ -221,3 +221,15 @@ def test_binary_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_bytes(b"0 1 0 0\n\xff\xfe\n")
     with pytest.raises(ValueError, match="byte 8 is not UTF-8"):
         load_recording(tmp_path / "a.txt")
+
+
+def test_only_the_beginning_is_read_if_asked_for() -> None:
+    whole = load_recording(TINY / "tiny.txt")
+    cut = load_recording(TINY / "tiny.txt", reading=Reading(until=3.0))
+    assert (cut.duration, cut.variant, cut.checksum) == (3.0, whole.variant, whole.checksum)
+    assert cut.reading == {"until": 3.0} and cut.n_people == 3
+    for index in range(3):
+        np.testing.assert_allclose(cut.positions[index][-1], whole.person(index).at(np.array([3.0]))[0][0])
+    assert load_recording(TINY / "tiny.txt", reading=Reading(until=99.0)).duration == whole.duration
+    with pytest.raises(ValueError, match=r"until = -1\.0 is not allowed"):
+        Reading(until=-1.0)

@@ -15,9 +15,12 @@ def describe(recording: "Recording") -> str:
     Returns:
         Text without a line end; it names the option that sets a frame rate where that was assumed.
     """
+    from socialnav_mj.recordings.known import is_simulated
+
+    kind = "simulated crowd" if is_simulated(recording.name, recording.variant) else "recording"
     rate = f"{recording.frame_rate:g} Hz ({recording.frame_rate_origin})"
     help_ = "; --frame-rate sets another" if recording.frame_rate_origin == "assumed" else ""
     return (
-        f"recording {recording.name}, variant {recording.variant}: {recording.n_people} people, "
+        f"{kind} {recording.name}, variant {recording.variant}: {recording.n_people} people, "
         f"{recording.duration:.1f} s, frame rate {rate}{help_}"
     )

@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from socialnav_mj.cli.console import console
+from socialnav_mj.recordings.known import crowd_of
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, Estimate
 from socialnav_mj.report.page import by_scenario, with_error
@@ -37,7 +38,7 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
     for (dataset, variant, scenario), rows in by_scenario(estimates):
         n_draws = max(row["success"].n_draws for _, row in rows)
         table = Table(
-            title=Text(f"{dataset} ({variant}), {scenario}"),
+            title=Text(f"{crowd_of(dataset, variant)}, {scenario}"),
             caption=f"means over {n_draws} draw(s), ± standard error; times count time-outs",
             box=box.SIMPLE_HEAD,
             padding=0,

@@ -4,8 +4,8 @@ import logging
 import os
 import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args
@@ -21,6 +21,8 @@ from socialnav_mj.resources import data_folder
 
 logger = logging.getLogger(__name__)
 
+UNKNOWN = "unknown"
+"""Stands for a sha256 that whoever wrote the catalogue could not compute; such files are never called verified."""
 DATA_VARIABLE = "SOCIALNAV_MJ_DATA"
 """Environment variable that names a data directory."""
 
@@ -44,7 +46,15 @@ class CatalogueRow:
     axis_order: AxisOrder
     """Whether the homography of the vsp takes (x, y) or (y, x)."""
     variants: Mapping[Variant, Mapping[str, str]]
-    """Per variant: file names with their sha256, in reading order; the first variant is the default."""
+    """Per variant: file names with their sha256 (or "unknown"), in reading order; the first variant is the default."""
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    """Addresses of files that are not below `url`."""
+    simulated: bool = False
+    """Whether a simulation made the people."""
+
+    def address(self, file: str) -> str:
+        """Where a file is downloaded from."""
+        return self.elsewhere.get(file, f"{self.url}{file}")
 
 
 @cache
@@ -73,7 +83,11 @@ def read_catalogue(path: Path) -> dict[str, CatalogueRow]:
         rows = tomllib.loads("\n".join(text_lines(path)))
     except (ValueError, RecursionError) as error:  # an integer of 5,000 digits is a plain ValueError
         raise FormatError(path, None, f"no TOML ({shown(str(error))})", "a table a recording") from None
-    return {name: _row(path, name, {"url": None, **row} if isinstance(row, dict) else {}) for name, row in rows.items()}
+    return {name: _row(path, name, {**_DEFAULTS, **row} if isinstance(row, dict) else {}) for name, row in rows.items()}
+
+
+_DEFAULTS: dict[str, Any] = {"url": None, "elsewhere": {}, "simulated": False}
+"""Of fields that a row may leave out."""
 
 
 def _row(path: Path, name: str, values: dict[str, Any]) -> CatalogueRow:
@@ -81,7 +95,7 @@ def _row(path: Path, name: str, values: dict[str, Any]) -> CatalogueRow:
         if not holds:
             raise FormatError(path, None, f"{what} of the recording '{shown(name)}' is not allowed", expected)
 
-    wanted = {field.name for field in fields(CatalogueRow)} - {"name"}
+    wanted = {own.name for own in fields(CatalogueRow)} - {"name"}
     require(values.keys() == wanted, "the set of fields", ", ".join(sorted(wanted)))
     for key in ("title", "folder", "source", "licence", "scale"):
         require(isinstance(values[key], str), key, "a text")
@@ -91,6 +105,13 @@ def _row(path: Path, name: str, values: dict[str, Any]) -> CatalogueRow:
     is_number = isinstance(rate, float | int) and not isinstance(rate, bool)
     require(is_number and FRAME_RATES[0] <= rate <= FRAME_RATES[1], "frame_rate", "a number of Hz")
     require(values["axis_order"] in get_args(AxisOrder), "axis_order", " or ".join(get_args(AxisOrder)))
+    require(isinstance(values["simulated"], bool), "simulated", "true or false")
+    places = values["elsewhere"]
+    require(
+        isinstance(places, dict) and all(isinstance(at, str) and at.startswith("https://") for at in places.values()),
+        "elsewhere",
+        "file names with https://...",
+    )
     variants = values["variants"]
     require(isinstance(variants, dict) and bool(variants), "variants", "a table a variant")
     for variant, files in variants.items():
@@ -98,7 +119,8 @@ def _row(path: Path, name: str, values: dict[str, Any]) -> CatalogueRow:
         require(isinstance(files, dict) and bool(files), variant, "file names with their sha256")
         for file, digest in files.items():
             plain = "/" not in file and _is_below(file)
-            require(plain and bool(re.fullmatch("[0-9a-f]{64}", str(digest))), variant, "file names with their sha256")
+            known = digest == UNKNOWN or bool(re.fullmatch("[0-9a-f]{64}", str(digest)))
+            require(plain and known, variant, "file names with their sha256")
     return CatalogueRow(name=name, **values)
 
 
@@ -192,9 +214,30 @@ def load_recording(
         known_axis_order=None if row is None else row.axis_order,
     )
     if warn:
-        for doubt in doubts(recording):
+        unknown = (
+            [] if row is None else [file for file, digest in row.variants.get(kind, {}).items() if digest == UNKNOWN]
+        )
+        for doubt in (*not_verified(unknown, recording.checksum), *doubts(recording)):
             logger.warning("%s: %s", name_or_path, doubt)
     return recording
+
+
+def not_verified(unknown: Sequence[str], checksum: str) -> tuple[str, ...]:
+    """What is said of files whose sha256 the catalogue does not know.
+
+    Args:
+        unknown: Names of the files.
+        checksum: Of all files of the recording.
+
+    Returns:
+        A sentence for a warning; none if there are none.
+    """
+    if not unknown:
+        return ()
+    return (
+        f"not verified: the catalogue knows no sha256 of {' and '.join(unknown)}; theirs here is "
+        f"{checksum}, which every episode keeps",
+    )
 
 
 def _variant(row: CatalogueRow, variant: str | None) -> Variant:
@@ -231,6 +274,8 @@ def _find(row: CatalogueRow, variant: Variant, data_dir: str | Path | None) -> t
 
 def _verify(row: CatalogueRow, variant: Variant, files: tuple[Path, ...]) -> None:
     for file, expected in zip(files, row.variants[variant].values(), strict=True):
+        if expected == UNKNOWN:
+            continue
         given = sha256([file])
         if given != expected:
             raise ValueError(

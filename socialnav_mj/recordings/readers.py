@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TextIO, get_args
 
@@ -11,6 +12,7 @@ from socialnav_mj.recordings.recording import Recording
 from socialnav_mj.recordings.tables import layout_of, read_text
 from socialnav_mj.recordings.trajnet import read_ndjson
 from socialnav_mj.recordings.ucy import read_obsmat, read_vsp
+from socialnav_mj.recordings.window import window
 
 Variant = Literal["vsp", "obsmat", "text", "ndjson"]
 DEFAULT_FRAME_RATE = 25.0
@@ -119,7 +121,7 @@ def read_recording(
     if not FRAME_RATES[0] <= rate <= FRAME_RATES[1]:
         expected = f"a frame rate from {FRAME_RATES[0]:g} to {FRAME_RATES[1]:g} Hz"
         raise FormatError(files[0], None, f"frames come at {rate:g} Hz", expected)
-    return samples.recording(
+    recording = samples.recording(
         name=name,
         variant=variant,
         frame_rate=rate,
@@ -127,6 +129,12 @@ def read_recording(
         checksum=sha256(files),
         reading=reading,
     )
+    if reading.until is None or reading.until >= recording.duration:
+        return recording
+    cut = window(recording, 0.0, reading.until / recording.duration)
+    if not cut.n_people:
+        raise FormatError(files[0], None, f"nobody is there before {reading.until:g} s", "a later --until")
+    return replace(cut, variant=variant)
 
 
 def _files_in_folder(folder: Path, variant: Variant | None, columns: Sequence[str]) -> tuple[Variant, tuple[Path, ...]]:

@@ -22,7 +22,7 @@ Collisions of all draws and agents together. Who moved into whom is decided by e
 contact normal just before the contact: at least 0.1 m/s towards the other. It is kinematics, not right of way. A \
 collision between two agents counts once here. *Struck standing*: share of all agents that somebody walked into while \
 they stood still (slower than 0.1 m/s). *Repeated*: collisions of a pair that had collided before. In the \
-human row the agents are the recorded people themselves.
+human row the agents are the people themselves.
 """
 
 _OVERLAPS = """\

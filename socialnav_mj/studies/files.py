@@ -12,6 +12,7 @@ from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import csv_bytes, write_json, write_whole
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import Recording
+from socialnav_mj.recordings.known import is_simulated
 from socialnav_mj.report.results import Results
 from socialnav_mj.studies.levels import Level
 from socialnav_mj.studies.study import Study
@@ -83,7 +84,9 @@ def traceability(provenance: Mapping[str, Any], recordings: Sequence[Mapping[str
         Lines.
     """
     lines = ["## Traceability", "", f"- experiment: `{json.dumps(provenance['experiment'], sort_keys=True)}`"]
-    lines += [f"- recording: {r['name']}, variant {r['variant']}, checksum {r['checksum']}" for r in recordings]
+    for r in recordings:
+        kind = "simulated crowd" if is_simulated(r["name"], r["variant"]) else "recording"
+        lines.append(f"- {kind}: {r['name']}, variant {r['variant']}, checksum {r['checksum']}")
     for policy, facts in provenance["policies"].items():
         lines += [f"- policy {policy}: training seed {facts['training_seed']}, sha256 {facts['sha256']}"]
     for name, run in provenance["runs"].items():

@@ -35,6 +35,7 @@ from socialnav_mj.files import written_whole
 from socialnav_mj.metrics.collisions import collisions
 from socialnav_mj.metrics.outcomes import success
 from socialnav_mj.metrics.proximity import INTIMATE_DISTANCE, nearest_pedestrian_distance
+from socialnav_mj.recordings.known import crowd_of
 from socialnav_mj.slots import share_slots
 from socialnav_mj.trace import layout as look
 from socialnav_mj.trace.events import events, touch_rows
@@ -143,7 +144,7 @@ def _summary(episode: Episode, name: str, chosen: IntArray) -> str:
             f"{counts[Outcome.OVERTURNED]} overturned, {counts[Outcome.NEVER_SPAWNED]} never spawned",
             f"- {int((collisions(episode) > 0).sum())} collided: {with_people} collisions with pedestrians, "
             f"{len(touches) - with_people} between agents",
-            f"- recording {recording['name']} ({recording['variant']}), {episode.n_pedestrians} people replayed, "
+            f"- {crowd_of(recording['name'], recording['variant'])}, {episode.n_pedestrians} people replayed, "
             f"{episode.time[-1] - episode.time[0]:.0f} s",
             "",
             look.KEY,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from socialnav_mj.recordings.known import crowd_of
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import head, row
 from socialnav_mj.studies.cells import interval_cell, mean_cell
@@ -79,7 +80,7 @@ def experiment_page(
         Markdown.
     """
     recording = provenance["recording"]
-    lines = [f"# The paper's study on {recording['name']} ({recording['variant']})", ""]
+    lines = [f"# The paper's study on {crowd_of(recording['name'], recording['variant'])}", ""]
     lines += [f"Command: `{provenance['command']}`", "", "## Claims of the paper, default setting", ""]
     lines += head(["claim", "the paper says", "verdict", "to decide"])
     lines += [row([f"({f.claim.key})", f.claim.sentence, f"**{f.verdict}**", to_decide(f)]) for f in findings]
