@@ -256,7 +256,7 @@ def described_settings(factory: Callable[..., Controller]) -> str:
         field = own.get(name)
         if field is not None and field.default_factory is not MISSING:
             part = field.default_factory()
-            default = _each(part, spec_of) if name in parts_of(factory) else part
+            default = each(part, spec_of) if name in parts_of(factory) else part
         if name != "name":
             shown.append(name if default is inspect.Parameter.empty else f"{name}={default!r}")
     return ", ".join(shown)
