@@ -77,13 +77,14 @@ class Cast:
         return len(self.pedestrian_index)
 
 
-def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
-    """Split a recording's people by the scenario's draw.
+def cast_recording(recording: Recording, scenario: Scenario, *, replaced: IntArray | None = None) -> Cast:
+    """Split a recording's people by the scenario's draw, or by a list.
 
     Args:
         recording: Its people become agents or pedestrians; of those not replaced, whoever is there at no control step
             is left out.
         scenario: Gives share, seed, minimum displacement, control time step and deadlines.
+        replaced: Indices of the people who become agents, ascending; those of the draw by default.
 
     Returns:
         Agents and pedestrians in the order of the recording; slots are given out so that as few as can be are needed.
@@ -94,9 +95,11 @@ def cast_recording(recording: Recording, scenario: Scenario) -> Cast:
     dt = scenario.control_timestep
     first = np.ceil(recording.start_time / dt - _GRID_TOLERANCE).astype(np.int64)
     last = np.floor(recording.end_time / dt + _GRID_TOLERANCE).astype(np.int64)
-    agents = replaced_people(
-        recording, share=scenario.share, seed=scenario.seed, minimum_displacement=scenario.minimum_displacement
-    )
+    agents = replaced
+    if agents is None:
+        agents = replaced_people(
+            recording, share=scenario.share, seed=scenario.seed, minimum_displacement=scenario.minimum_displacement
+        )
     if not len(agents):
         raise ValueError(
             f"share = {scenario.share} of the {recording.n_people} people of recording {recording.name!r} leaves no "

@@ -10,6 +10,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from socialnav_mj.config import Scenario
+from socialnav_mj.episode import IntArray
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.scene import build_model
@@ -84,6 +85,7 @@ def build_environment(
     random: int | np.random.RandomState | None = None,
     environment_kwargs: dict[str, Any] | None = None,
     grow: bool = False,
+    replaced: IntArray | None = None,
 ) -> Environment:
     """A dm_control environment of a recording that is at hand and a scenario that is final.
 
@@ -96,11 +98,12 @@ def build_environment(
         grow: Begin with as many robots as are likely to be in the scene at once, and compile it anew if more are. No
             bit of an episode depends on it, but who holds on to the model, as dm_control's viewer does, must not see it
             change.
+        replaced: Indices of the people who become agents, ascending; those of the scenario's draw by default.
 
     Returns:
         An environment whose task is a `CrowdTask` and whose physics is a `Physics`.
     """
-    task = CrowdTask(recording, scenario, random=random)
+    task = CrowdTask(recording, scenario, random=random, replaced=replaced)
     everywhere = np.concatenate(recording.positions)
     build = partial(
         build_model,

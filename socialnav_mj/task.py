@@ -37,7 +37,12 @@ class CrowdTask(base.Task):
     """
 
     def __init__(
-        self, recording: Recording, scenario: Scenario, random: int | np.random.RandomState | None = None
+        self,
+        recording: Recording,
+        scenario: Scenario,
+        random: int | np.random.RandomState | None = None,
+        *,
+        replaced: IntArray | None = None,
     ) -> None:
         """Prepare the cast and the pedestrians' motion at every physics step.
 
@@ -45,11 +50,12 @@ class CrowdTask(base.Task):
             recording: Whose people are replaced and replayed.
             scenario: Its draw, bodies, limits and rules.
             random: Kept for dm_control; nothing in an episode is random once the scenario is given.
+            replaced: Indices of the people who become agents, ascending; those of the draw by default.
         """
         super().__init__(random=random)
         self.recording = recording
         self.scenario = scenario
-        self.cast: Cast = cast_recording(recording, scenario)
+        self.cast: Cast = cast_recording(recording, scenario, replaced=replaced)
         self._replay = Replay(recording, scenario, self.cast)
         self._clear()
 
@@ -224,8 +230,6 @@ class CrowdTask(base.Task):
         """
         return 0.0 if np.all(self.outcome != _UNDER_WAY) else None
 
-    # People
-
     def _update_pedestrians(self, physics: Physics) -> None:
         """Place people at the current step; whoever appears on a robot stays contact-free until clear of all robots."""
         now = self._replay.crowd(self.step)
@@ -240,8 +244,6 @@ class CrowdTask(base.Task):
     def _robots(self, physics: Physics) -> Array:
         """Positions of the robots under way, shape (k, 2) [m]."""
         return physics.agent_position()[self._slot_agent != NOBODY]
-
-    # Agents
 
     def _spawn(self, physics: Physics) -> bool:
         """Let agents in whose person has appeared, in that order, where there is room; the others wait."""

@@ -323,7 +323,9 @@ def test_affinity_map_counts_and_averages_the_people_of_a_cell():
 
 def test_feature_sets_are_found_by_name_and_errors_name_them():
     assert feature_set("risk").size == 80 and feature_set("continuous").size == 54
-    with pytest.raises(ValueError, match="unknown feature set 'rsk'; available: continuous, companions, risk, sam"):
+    with pytest.raises(
+        ValueError, match="unknown feature set 'rsk'; available: continuous, companions, risk, sam, people"
+    ):
         feature_set("rsk")
 
 
@@ -335,7 +337,8 @@ def test_docstring_table_covers_every_index_once(features):
     for row in rows:
         numbers = [int(number) for number in re.findall(r"\d+", row)]
         if "k" in row:
-            indices += range(numbers[0], numbers[0] + features.n_sectors)
+            many = features.n_people if features.name == "people" else features.n_sectors
+            indices += range(numbers[0], numbers[0] + many)
         else:
             indices += range(numbers[0], numbers[-1] + 1)
     assert indices == list(range(features.size)) == list(range(features(view()).shape[1]))

@@ -15,9 +15,9 @@ from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
 
 from socialnav_mj.config import Scenario  # noqa: E402
 from socialnav_mj.controllers.replay_irl import load_policy  # noqa: E402
+from socialnav_mj.envs.sb3 import CrowdVecEnv  # noqa: E402
 from socialnav_mj.features import feature_set  # noqa: E402
 from socialnav_mj.learning.config import TrainingConfig  # noqa: E402
-from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv  # noqa: E402
 from socialnav_mj.learning.experts import Demonstrations, ExpertSampler, demonstrate  # noqa: E402
 from socialnav_mj.learning.policy_file import save_policy  # noqa: E402
 from socialnav_mj.learning.replay_irl import ReplayIRL  # noqa: E402

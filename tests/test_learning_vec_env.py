@@ -9,9 +9,9 @@ from scenes import TINY, recording_of, stand, walk
 from stable_baselines3.common.vec_env import VecCheckNan, VecEnv, VecMonitor
 
 from socialnav_mj.cast import NOBODY
+from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.episode import Outcome
 from socialnav_mj.features import FEATURE_SETS, feature_set, running_state, view_of
-from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
 from socialnav_mj.recordings import load_recording
 
 SHORT = walk([(0.0, 0.0), (1.2, 0.0)], 1.0)

@@ -3,19 +3,22 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.geometry import Array, wheel_speed_of_twist
+from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
 
 Observation = Mapping[str, NDArray[Any]]
 
 IS_CONTROLLER = "is_controller"
 """Key in the metadata of a dataclass field that holds another controller, or a tuple of them; on the command line and
 in an episode they are written as `make_controller` takes them."""
+
+ActionKind = Literal["twist", "wheels"]
+"""What the two numbers of a normalised action are, see `Limits.wheel_speed_of_action`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +72,52 @@ class Limits:
         twist = np.asarray(twist, dtype=float)
         low, high = (0.0, -self.max_yaw_rate), (self.max_speed, self.max_yaw_rate)
         return wheel_speed_of_twist(np.clip(twist, low, high), wheel_radius=self.wheel_radius, track=self.track)
+
+    def twist_of_action(self, action: Array) -> Array:
+        """The twist that a normalised action stands for.
+
+        Args:
+            action: (speed, turn) in [-1, 1], shape (n_agents, 2).
+
+        Returns:
+            Forward speed (speed + 1) / 2 of the limit [m/s] and turn times the limit of the yaw rate [rad/s].
+        """
+        return np.stack([0.5 * (action[:, 0] + 1.0) * self.max_speed, action[:, 1] * self.max_yaw_rate], axis=1)
+
+    def action_of_twist(self, twist: Array) -> Array:
+        """Inverse of `twist_of_action`.
+
+        Args:
+            twist: Shape (n_agents, 2) [m/s], [rad/s].
+
+        Returns:
+            (speed, turn), shape (n_agents, 2).
+        """
+        return np.stack([2.0 * twist[:, 0] / self.max_speed - 1.0, twist[:, 1] / self.max_yaw_rate], axis=1)
+
+    def wheel_speed_of_action(self, action: Array, kind: ActionKind = "twist") -> Array:
+        """The wheel speeds that a normalised action stands for, within the limits.
+
+        Args:
+            action: Numbers in [-1, 1], shape (n_agents, 2): (speed, turn) as in `twist_of_action`, or for "wheels" the
+                left and right wheel's speed as a share of the fastest that a wheel can turn.
+            kind: Which of the two.
+
+        Returns:
+            (left, right) wheel speeds, shape (n_agents, 2) [rad/s].
+
+        Raises:
+            ValueError: If there is no such kind.
+        """
+        if kind not in get_args(ActionKind):
+            raise ValueError(f"action = {kind!r} is not allowed; allowed: {', '.join(get_args(ActionKind))}")
+        action = np.asarray(action, dtype=float)
+        if kind == "twist":
+            return self.wheel_speed(self.twist_of_action(action))
+        fastest = (self.max_speed + 0.5 * self.track * self.max_yaw_rate) / self.wheel_radius
+        return self.wheel_speed(
+            twist_of_wheel_speed(fastest * action, wheel_radius=self.wheel_radius, track=self.track)
+        )
 
 
 @runtime_checkable

@@ -1,18 +1,16 @@
 """The learned policy (paper section III-A): a trained SAC actor in numpy, without torch."""
 
-import hashlib
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from safetensors.numpy import load
 
 from socialnav_mj.config import Scenario, TurnLimit
 from socialnav_mj.controllers.base import Observation, TwistController
-from socialnav_mj.controllers.policy_card import PolicyError, read_card
+from socialnav_mj.controllers.policy_card import PolicyError
+from socialnav_mj.controllers.weights import Layers, forward, networks_of, read_weights
 from socialnav_mj.elementary import tanh
 from socialnav_mj.features import N_FLAGS, FeatureSet, feature_set, running_state, view_of
 from socialnav_mj.geometry import Array
@@ -31,9 +29,9 @@ class TrainedPolicy:
     """sha256 of the weights' file."""
     features: FeatureSet
     """Makes the networks' input of what agents see."""
-    actor: tuple[tuple[Array, Array], ...]
+    actor: Layers
     """(weight (out, in), bias (out,)) of each layer of the actor, size + 2 inputs, 2 outputs."""
-    reward: tuple[tuple[Array, Array], ...]
+    reward: Layers
     """The same of the reward network, size + 2 inputs, 1 output."""
 
     @property
@@ -55,7 +53,7 @@ class TrainedPolicy:
         Returns:
             (speed, turn) in [-1, 1], shape (n, 2).
         """
-        return tanh(_forward(self.actor, state))
+        return tanh(forward(self.actor, state))
 
     def reward_of(self, state: Array) -> Array:
         """What the reward network gives to states: tanh of its output.
@@ -66,17 +64,8 @@ class TrainedPolicy:
         Returns:
             Shape (n,), in (-1, 1).
         """
-        reward: Array = tanh(_forward(self.reward, state))[:, 0]
+        reward: Array = tanh(forward(self.reward, state))[:, 0]
         return reward
-
-
-def _forward(layers: tuple[tuple[Array, Array], ...], values: Array) -> Array:
-    for number, (weight, bias) in enumerate(layers, start=1):
-        # Not a matrix product, whose order of summation is BLAS's choice for the processor, see `elementary`.
-        values = np.einsum("ni,oi->no", values, weight) + bias
-        if number < len(layers):
-            values = np.maximum(values, 0.0)
-    return values
 
 
 def policies_folder() -> Path:
@@ -157,58 +146,14 @@ def load_policy(name_or_path: str) -> TrainedPolicy:
 @lru_cache(maxsize=32)
 def _read(path: Path, *_modified: int) -> TrainedPolicy:
     """Read a policy once for each state of its files."""
-    card_path = path.with_suffix(".json")
-    card, content = read_card(card_path), path.read_bytes()
-    checksum = hashlib.sha256(content).hexdigest()
-    if checksum != card["sha256"]:
-        raise PolicyError(f"{path} has sha256 {checksum}, but its card {card_path.name} says {card['sha256']}")
+    card, checksum, tensors = read_weights(path)
     try:
         features = feature_set(card["config"]["features"])
     except ValueError as error:
-        raise PolicyError(f"{card_path}: config.features: {error}") from error
-    try:
-        tensors = load(content)
-    except Exception as error:
-        # Which exceptions a file that was made to do harm can provoke here is the library's matter.
-        raise PolicyError(f"{path} is no readable safetensors file: {error!r}") from error
+        raise PolicyError(f"{path.with_suffix('.json')}: config.features: {error}") from error
     inputs = features.size + N_FLAGS
-    networks = {name: _layers(path, tensors, name, inputs, outputs) for name, outputs in (("actor", 2), ("reward", 1))}
-    used = {f"{n}.{i}.{k}" for n, own in networks.items() for i in range(len(own)) for k in ("weight", "bias")}
-    if unknown := sorted({*tensors} - used):
-        raise PolicyError(f"{path}: it has unknown tensors {', '.join(unknown)}")
+    networks = networks_of(path, tensors, {"actor": (inputs, 2), "reward": (inputs, 1)})
     return TrainedPolicy(card=card, checksum=checksum, features=features, **networks)
-
-
-def _layers(
-    path: Path, tensors: dict[str, NDArray[Any]], network: str, inputs: int, outputs: int
-) -> tuple[tuple[Array, Array], ...]:
-    """Layers of a network that follow one another from so many inputs to so many outputs; anything else is refused."""
-    layers: list[tuple[Array, Array]] = []
-    width = inputs
-    while not layers or any(f"{network}.{len(layers)}.{kind}" in tensors for kind in ("weight", "bias")):
-        name = f"{network}.{len(layers)}"
-        weight, bias = _numbers(path, tensors, f"{name}.weight"), _numbers(path, tensors, f"{name}.bias")
-        if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
-            raise PolicyError(
-                f"{path}: {name} has weight {weight.shape} and bias {bias.shape}; expected (n, {width}) and (n,)"
-            )
-        layers.append((weight, bias))
-        width = weight.shape[0]
-    if width != outputs:
-        raise PolicyError(f"{path}: the {network} maps {inputs} to {width} numbers; expected {inputs} to {outputs}")
-    return tuple(layers)
-
-
-def _numbers(path: Path, tensors: dict[str, NDArray[Any]], key: str) -> Array:
-    """A tensor whose values cannot overflow in the forward pass."""
-    if key not in tensors:
-        raise PolicyError(f"{path}: it lacks {key}")
-    if tensors[key].dtype.kind != "f":
-        raise PolicyError(f"{path}: {key} holds {tensors[key].dtype}; expected floating-point numbers")
-    values = tensors[key].astype(float)
-    if not (np.abs(values) <= np.finfo(np.float32).max).all():
-        raise PolicyError(f"{path}: {key} holds values that are not finite, or too large for single precision")
-    return values
 
 
 @dataclass(kw_only=True)
@@ -243,7 +188,5 @@ class ReplayIRL(TwistController):
         result = np.zeros((len(observation["active"]), 2))
         if rows.size:
             state = running_state(self._trained.features(view_of(observation, rows)))
-            action = self._trained.action(state)
-            result[rows, 0] = 0.5 * (action[:, 0] + 1.0) * self.limits.max_speed
-            result[rows, 1] = action[:, 1] * self.limits.max_yaw_rate
+            result[rows] = self.limits.twist_of_action(self._trained.action(state))
         return result

@@ -7,6 +7,7 @@ change when the scene is moved or turned. Pedestrians and other agents are peopl
 from socialnav_mj.features.affinity import Affinity
 from socialnav_mj.features.companions import Companions
 from socialnav_mj.features.continuous import SIGHT, Continuous
+from socialnav_mj.features.people import People
 from socialnav_mj.features.risk import Risk
 from socialnav_mj.features.sets import FEATURE_SETS, FeatureSet, feature_set
 from socialnav_mj.features.states import (
@@ -30,6 +31,7 @@ __all__ = [
     "Companions",
     "Continuous",
     "FeatureSet",
+    "People",
     "Risk",
     "View",
     "absorbing_state",

@@ -5,6 +5,7 @@ from typing import Protocol
 from socialnav_mj.features.affinity import Affinity
 from socialnav_mj.features.companions import Companions
 from socialnav_mj.features.continuous import Continuous
+from socialnav_mj.features.people import People
 from socialnav_mj.features.risk import Risk
 from socialnav_mj.features.view import View
 from socialnav_mj.geometry import Array
@@ -25,7 +26,7 @@ class FeatureSet(Protocol):
 
 
 FEATURE_SETS: dict[str, FeatureSet] = {
-    features.name: features for features in (Continuous(), Companions(), Risk(), Affinity())
+    features.name: features for features in (Continuous(), Companions(), Risk(), Affinity(), People())
 }
 
 

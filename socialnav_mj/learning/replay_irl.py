@@ -21,9 +21,9 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
 from stable_baselines3.common.noise import ActionNoise
 
+from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.features import FeatureSet
 from socialnav_mj.learning.config import TrainingConfig
-from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
 from socialnav_mj.learning.experts import Demonstrations, ExpertSampler
 from socialnav_mj.learning.reward import (
     RewardNet,

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -13,11 +12,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from socialnav_mj.config import Scenario
+from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.features import feature_set
-from socialnav_mj.files import write_json, write_whole, written_whole
+from socialnav_mj.files import write_whole, written_whole
 from socialnav_mj.learning.config import TrainingConfig
-from socialnav_mj.learning.crowd_vec_env import CrowdVecEnv
 from socialnav_mj.learning.experts import Demonstrations, demonstrate
+from socialnav_mj.learning.folder import CHECKPOINT, HISTORY, PACKAGES, Progress, claim, complete_card
 from socialnav_mj.learning.policy_file import save_policy
 from socialnav_mj.learning.replay_irl import ReplayIRL
 from socialnav_mj.learning.shipping import BEST
@@ -25,21 +25,6 @@ from socialnav_mj.learning.validation import is_kept, validate
 from socialnav_mj.provenance import package_versions, recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.window import window
-
-PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
-CHECKPOINT, HISTORY, CONFIG = "checkpoint.pt", "history.json", "config.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Progress:
-    """What is told of a training under way."""
-
-    scene_steps: int
-    """Done so far."""
-    transitions: int
-    """In the shared buffer."""
-    validation: dict[str, float] | None
-    """Of the checkpoint just written, if there was one."""
 
 
 def train(
@@ -65,7 +50,7 @@ def train(
         FileNotFoundError: If a recording is not there.
     """
     folder = Path(folder)
-    _claim(folder, config)
+    claim(folder, config.as_dict())
     torch.set_num_threads(1)
     recordings = [load_recording(name, data_dir=data_dir) for name in config.datasets]
     features = feature_set(config.features)
@@ -107,44 +92,8 @@ def train(
     if left > 0:
         callback = _Checkpoints(config, folder, recordings, history, progress)
         model.learn(left * env.num_envs, callback=callback, reset_num_timesteps=False, log_interval=1)
-    _complete_card(folder / BEST, config, recordings, history)
+    complete_card(folder / BEST, config, recordings, history)
     return folder / BEST
-
-
-def _complete_card(
-    path: Path, config: TrainingConfig, recordings: list[Recording], history: list[dict[str, Any]]
-) -> None:
-    """Add what the best policy does on the parts it was trained on, chosen on, and has never seen."""
-    card_path = path.with_suffix(".json")
-    card = json.loads(card_path.read_text())
-    if "metrics" in card:
-        return
-    parts = {"in_sample": config.train_window, "validation": config.validation_window, "held_out": config.test_window}
-    card["metrics"] = {
-        name: {
-            "window": part,
-            **validate(path, recordings, part=part, shares=config.validation_shares, turn_limit=config.turn_limit),
-        }
-        for name, part in parts.items()
-    }
-    card["history"] = history
-    write_json(card_path, card)
-
-
-def _claim(folder: Path, config: TrainingConfig) -> None:
-    """Write the configuration, or compare it with what is there."""
-    wanted = json.loads(json.dumps(config.as_dict()))
-    path = folder / CONFIG
-    if not path.exists():
-        write_whole(path, (json.dumps(wanted, indent=1) + "\n").encode())
-        return
-    found = json.loads(path.read_text())
-    for key in sorted({*wanted, *found}):
-        if wanted.get(key) != found.get(key):
-            raise ValueError(
-                f"{path}: the training there has {key} = {found.get(key)!r}, but {wanted.get(key)!r} is asked for; "
-                "choose another output folder"
-            )
 
 
 class _Checkpoints(BaseCallback):

@@ -1,7 +1,7 @@
 """What a policy does on a part of a recording, and which checkpoint of a training is kept."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from socialnav_mj import metrics
 from socialnav_mj.config import Scenario, TurnLimit
+from socialnav_mj.controllers import Controller
 from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
 from socialnav_mj.environment import build_environment
 from socialnav_mj.learning.config import TrainingConfig
@@ -24,6 +25,7 @@ def validate(
     part: tuple[float, float],
     shares: tuple[float, ...],
     turn_limit: TurnLimit = "per_step",
+    controller: Callable[..., Controller] = Policy,
 ) -> dict[str, float]:
     """Success and intrusions of a policy in a part of recordings.
 
@@ -33,6 +35,7 @@ def validate(
         part: Window, as shares of their duration.
         shares: Of replaced people; the scenes have draws 0, 1, 2, ...
         turn_limit: Of the scenes.
+        controller: Drives the policy, a path, that it is given as `policy`.
 
     Returns:
         success, intrusion_share, time_under_way [s], n_agents.
@@ -45,7 +48,7 @@ def validate(
             environment = build_environment(
                 window(recording, *part), Scenario(share=share, seed=draw, turn_limit=turn_limit)
             )
-            values = metrics.per_agent(rollout(environment, Policy(policy=str(policy_path))))
+            values = metrics.per_agent(rollout(environment, controller(policy=str(policy_path))))
             success += values["success"].astype(float).tolist()
             time += values["time_under_way"].tolist()
             intrusions += float(np.nansum(values["intimate_intrusions"]))

@@ -23,8 +23,32 @@ def window(recording: Recording, begin: float, end: float) -> Recording:
     if not 0.0 <= begin < end <= 1.0:
         raise ValueError(f"window [{begin}, {end}] is not allowed; allowed: 0 <= begin < end <= 1")
     first, last = begin * recording.duration, end * recording.duration
+    return _cut(recording, first, last, last, f"[{begin:g}-{end:g}]")
+
+
+def excerpt(recording: Recording, begin: float, end: float) -> Recording:
+    """Whoever is there between two moments, from the first of them to where they really went.
+
+    Args:
+        recording: Whose tracks are cut at the first moment alone.
+        begin: At least 0, before the end of the recording [s].
+        end: Whoever appears later is left out, > begin [s].
+
+    Returns:
+        As `window` does.
+
+    Raises:
+        ValueError: If the moments are not in order.
+    """
+    if not 0.0 <= begin < end:
+        raise ValueError(f"excerpt from {begin} to {end} s is not allowed; allowed: 0 <= begin < end")
+    return _cut(recording, begin, end, recording.duration, f"[{begin:g} s-{end:g} s]")
+
+
+def _cut(recording: Recording, first: float, latest: float, last: float, name: str) -> Recording:
+    """People who are there between `first` and `latest`, between `first` and `last`."""
     ids, times, positions = [], [], []
-    for index in range(recording.n_people):
+    for index in np.flatnonzero((recording.start_time <= latest) & (recording.end_time >= first)):
         own = recording.times[index]
         inside = own[(own > first) & (own < last)]
         edges = np.array([first, last])
@@ -33,10 +57,10 @@ def window(recording: Recording, begin: float, end: float) -> Recording:
             continue
         ids.append(int(recording.ids[index]))
         times.append(cut - first)
-        positions.append(recording.person(index).at(cut)[0])
+        positions.append(recording.person(int(index)).at(cut)[0])
     return Recording(
         name=recording.name,
-        variant=f"{recording.variant}[{begin:g}-{end:g}]",
+        variant=f"{recording.variant}{name}",
         frame_rate=recording.frame_rate,
         ids=np.array(ids, dtype=np.int64),
         times=tuple(times),

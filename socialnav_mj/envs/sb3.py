@@ -1,25 +1,22 @@
 """A crowd as a stable-baselines3 VecEnv: every slot of the scene is one environment."""
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from socialnav_mj.cast import NOBODY, cast_recording
 from socialnav_mj.config import Robot, Scenario, TurnLimit
-from socialnav_mj.controllers import Limits, make_controller
-from socialnav_mj.environment import Environment, build_environment
+from socialnav_mj.controllers import make_controller
+from socialnav_mj.environment import Environment
+from socialnav_mj.envs.crowd import UNDER_WAY, Crowd
+from socialnav_mj.envs.spaces import action_space, observation_space, row_of
 from socialnav_mj.episode import Outcome
-from socialnav_mj.features import COLLISION_FLAG, GOAL_FLAG, FeatureSet, absorbing_state, running_state, view_of
+from socialnav_mj.features import FeatureSet
+from socialnav_mj.features.seen import Flat
 from socialnav_mj.geometry import Array, twist_of_wheel_speed
 from socialnav_mj.recordings import Recording
-
-_MOST_DRAWS = 1000
 
 
 class CrowdVecEnv(VecEnv):
@@ -29,7 +26,7 @@ class CrowdVecEnv(VecEnv):
     `infos[slot]["active"]` is False for what its step was. When a run ends, `dones[slot]` is True,
     `infos[slot]["terminal_observation"]` holds its last state (absorbing at the goal, collided or overturned), and
     `infos[slot]["TimeLimit.truncated"]` says that a deadline ended it. When the last run of a scene has ended, the next
-    scene begins. Rewards are the tasks' own; ReplayIRL replaces them.
+    scene begins. Rewards are the tasks' own.
     """
 
     def __init__(
@@ -39,10 +36,10 @@ class CrowdVecEnv(VecEnv):
         *,
         shares: Sequence[float],
         n_slots: int,
-        robot_radius: float,
-        pedestrian_radius: float,
+        robot_radius: float = Robot.radius,
+        pedestrian_radius: float = Scenario.pedestrian_radius,
         turn_limit: TurnLimit = "per_step",
-        guide: str,
+        guide: str = "go_straight",
         seed: int,
     ) -> None:
         """Build the first scene.
@@ -58,42 +55,29 @@ class CrowdVecEnv(VecEnv):
             guide: Controller that `guide_action` asks.
             seed: Seed from which the seeds of all draws are taken.
         """
-        self._guide = make_controller(guide)
-        self._recordings, self._shares, self._features = tuple(recordings), tuple(shares), features
-        self._scenario = Scenario(
+        scenario = Scenario(
             robot=Robot(radius=robot_radius),
             pedestrian_radius=pedestrian_radius,
             turn_limit=turn_limit,
             on_collision="retire",
         )
-        self._random = np.random.default_rng(seed)
-        self._scenes = 0
+        self._guide = make_controller(guide)
+        self._observer = Flat(features)
+        self._crowd = Crowd(recordings, self._observer, scenario, shares=shares, n_slots=n_slots, seed=seed)
         self._actions = np.zeros((n_slots, 2))
-        self._asked = False
-        size = features.size + 2
-        super().__init__(
-            n_slots, spaces.Box(-np.inf, np.inf, (size,), np.float32), spaces.Box(-1.0, 1.0, (2,), np.float32)
-        )
-        self.environment = self._next_scene()
+        self._note_scene()
+        super().__init__(n_slots, observation_space(self._observer), action_space())
 
-    def _next_scene(self) -> Environment:
-        self._drawn_from = {"random": json.dumps(self._random.bit_generator.state), "scenes": self._scenes}
-        recording = self._recordings[self._scenes % len(self._recordings)]
-        share = self._shares[self._scenes // len(self._recordings) % len(self._shares)]
-        self._scenes += 1
-        for _ in range(_MOST_DRAWS):
-            seed = int(self._random.integers(2**31))
-            scenario = replace(self._scenario, share=share, seed=seed)
-            if cast_recording(recording, scenario).n_agent_slots <= self.num_envs:
-                break
-        else:
-            raise ValueError(
-                f"no draw of recording {recording.name!r} at share {share} has at most n_slots = {self.num_envs} "
-                "agents at once; allow more slots or a smaller share"
-            )
-        self._limits = Limits.of(scenario)
-        self._guide.reset(self._limits, seed=seed)
-        return build_environment(recording, scenario)
+    @property
+    def environment(self) -> Environment:
+        """The scene that is being played."""
+        return self._crowd.environment
+
+    def _note_scene(self) -> None:
+        """The scene has just been drawn, or is to be played from its beginning."""
+        self._guide.reset(self._crowd.limits, seed=self.environment.task.scenario.seed)
+        self._asked: list[bool] = []
+        self._is_asked = False
 
     def reset(self) -> NDArray[np.float32]:
         """Begin the scene.
@@ -101,9 +85,8 @@ class CrowdVecEnv(VecEnv):
         Returns:
             Shape (n_slots, state size).
         """
-        self._past: list[tuple[Array, bool]] = []
-        self.environment.reset()
-        return self._states()[0]
+        self._asked = []
+        return self._crowd.begin()[""]
 
     def state(self) -> dict[str, Any]:
         """All that brings this moment back: what the scene was drawn from, and what was done in it.
@@ -111,8 +94,7 @@ class CrowdVecEnv(VecEnv):
         Returns:
             Plain values and arrays for `restore`.
         """
-        actions = np.array([action for action, _ in self._past]).reshape(len(self._past), self.num_envs, 2)
-        return {**self._drawn_from, "actions": actions, "asked": np.array([asked for _, asked in self._past], bool)}
+        return {**self._crowd.state(), "asked": np.array(self._asked, dtype=bool)}
 
     def restore(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
         """Draw a scene again and do in it what was done; simulations are repeatable to the bit.
@@ -123,9 +105,8 @@ class CrowdVecEnv(VecEnv):
         Returns:
             What the agents see then, shape (n_slots, state size).
         """
-        self._random.bit_generator.state = json.loads(state["random"])
-        self._scenes = int(state["scenes"])
-        self.environment = self._next_scene()
+        self._crowd.restore(state)
+        self._note_scene()
         seen = self.reset()
         for action, asked in zip(np.asarray(state["actions"]), np.asarray(state["asked"]), strict=True):
             if asked:
@@ -138,7 +119,7 @@ class CrowdVecEnv(VecEnv):
         """Take the actions of the next step.
 
         Args:
-            actions: (speed, turn) in [-1, 1], shape (n_slots, 2); see `socialnav_mj.controllers.replay_irl`.
+            actions: (speed, turn) in [-1, 1], shape (n_slots, 2); see `Limits.twist_of_action`.
         """
         self._actions = np.array(actions, dtype=float)
 
@@ -148,30 +129,20 @@ class CrowdVecEnv(VecEnv):
         Returns:
             States (n_slots, size), rewards (n_slots,), dones (n_slots,), infos.
         """
-        task = self.environment.task
-        count = task.cast.n_agent_slots
-        before = task.slot_agent
-        self._past.append((self._actions, self._asked))
-        self._asked = False
-        time_step = self.environment.step(self._limits.wheel_speed(self._twist(self._actions[:count])))
-        states, final = self._states()
-        rewards = np.zeros(self.num_envs, dtype=np.float32)
-        rewards[:count] = time_step.reward
-        dones = np.zeros(self.num_envs, dtype=bool)
-        infos: list[dict[str, Any]] = [{"active": False} for _ in range(self.num_envs)]
-        for slot in np.flatnonzero(before != NOBODY):
-            infos[slot]["active"] = True
-            outcome = task.outcome[before[slot]]
-            if outcome < 0:
-                continue
-            dones[slot] = True
-            infos[slot]["terminal_observation"] = self._terminal(int(outcome), final[slot])
+        scene = self.environment
+        self._asked.append(self._is_asked)
+        self._is_asked = False
+        step = self._crowd.step(self._actions)
+        if self.environment is not scene:
+            self._note_scene()
+        infos: list[dict[str, Any]] = [{"active": active} for active in step.active.tolist()]
+        dones = step.outcome != UNDER_WAY
+        for slot in np.flatnonzero(dones):
+            outcome = int(step.outcome[slot])
+            infos[slot]["terminal_observation"] = self._observer.ended(row_of(step.final, slot), outcome)[""]
             infos[slot]["TimeLimit.truncated"] = outcome == Outcome.TIMED_OUT
-            infos[slot]["outcome"] = int(outcome)
-        if time_step.last():
-            self.environment = self._next_scene()
-            states = self.reset()
-        return states, rewards, dones, infos
+            infos[slot]["outcome"] = outcome
+        return step.seen[""], step.reward, dones, infos
 
     def guide_action(self) -> Array:
         """What the guide would do now.
@@ -179,37 +150,13 @@ class CrowdVecEnv(VecEnv):
         Returns:
             (speed, turn) in [-1, 1], shape (n_slots, 2); of no meaning in empty slots.
         """
-        self._asked = True
-        task = self.environment.task
+        self._is_asked = True
+        limits, task = self._crowd.limits, self.environment.task
         wheel_speed = self._guide.act(task.get_observation(self.environment.physics))
-        twist = twist_of_wheel_speed(wheel_speed, wheel_radius=self._limits.wheel_radius, track=self._limits.track)
+        twist = twist_of_wheel_speed(wheel_speed, wheel_radius=limits.wheel_radius, track=limits.track)
         action = np.zeros((self.num_envs, 2))
-        action[: len(twist), 0] = 2.0 * twist[:, 0] / self._limits.max_speed - 1.0
-        action[: len(twist), 1] = twist[:, 1] / self._limits.max_yaw_rate
+        action[: len(twist)] = limits.action_of_twist(twist)
         return action
-
-    def _twist(self, actions: Array) -> Array:
-        return np.stack(
-            [0.5 * (actions[:, 0] + 1.0) * self._limits.max_speed, actions[:, 1] * self._limits.max_yaw_rate], axis=1
-        )
-
-    def _terminal(self, outcome: int, state: NDArray[np.float32]) -> NDArray[np.float32]:
-        if outcome == Outcome.ARRIVED:
-            return absorbing_state(self._features.size, GOAL_FLAG).astype(np.float32)
-        if outcome in (Outcome.COLLIDED, Outcome.OVERTURNED):
-            return absorbing_state(self._features.size, COLLISION_FLAG).astype(np.float32)
-        return state
-
-    def _states(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """States of the agents under way, and the same with those whose run just ended."""
-        task = self.environment.task
-        final = np.zeros((self.num_envs, self._features.size + 2), dtype=np.float32)
-        rows = np.flatnonzero(task.sample.agent != NOBODY)
-        if rows.size:
-            final[rows] = running_state(self._features(view_of(task.final_observation(), rows)))
-        states = final.copy()
-        states[: task.cast.n_agent_slots][task.slot_agent == NOBODY] = 0.0
-        return states, final
 
     def close(self) -> None:
         """Nothing to close."""
