@@ -36,9 +36,12 @@ class Evaluate:
     scenarios: Scenarios = (1, 2, 3, 4)
     """Scenarios that replace 10, 30, 70, 90 % of the people."""
     controllers: tuple[str, ...] = ("potential_field", "go_straight")
-    """Names (see `list`), package.module:Class, or either with settings: 'potential_field(repulsion_gain=3.0)'.
+    """Names (see `list`), package.module:Class, sb3:policy.zip, or any with settings:
+    'potential_field(repulsion_gain=3.0)'.
     replay_irl and hybrid act with the shipped policy that learned from the recording, if there is one, else with
     plaza's."""
+    trust: tuple[str, ...] = ()
+    """Policies of stable-baselines3 among the controllers, as sb3:policy.zip; reading them runs the code in them."""
     draws: int = 3
     """Random choices of the replaced people; 10 or more for figures to publish."""
     seed: int = 0
@@ -58,6 +61,7 @@ class Evaluate:
         """Run what is missing behind a bar, write tables, report and traces, and print the main columns."""
         from socialnav_mj.cli.terminal import show
         from socialnav_mj.controllers import with_policy_of
+        from socialnav_mj.controllers.specs import with_trust
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of, recording_of
         from socialnav_mj.report.writer import write_report
         from socialnav_mj.resumption import ChangedError
@@ -70,7 +74,7 @@ class Evaluate:
             data_dir=None if self.data_dir is None else str(self.data_dir),
             reading=self.reading,
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
-            controllers=tuple(with_policy_of(spec, self.dataset) for spec in self.controllers),
+            controllers=tuple(with_trust(with_policy_of(spec, self.dataset), self.trust) for spec in self.controllers),
             draws=self.draws,
             seed=self.seed,
             task_kwargs=changes(self.settings),
@@ -122,7 +126,7 @@ class Verify:
     data_dir: Folder = None
     """Where recordings are looked for first."""
     trust: tuple[str, ...] = ()
-    """package.module:Class of controllers that the files may have run; importing them runs their code. Built-in
+    """package.module:Class or sb3:policy.zip that the files may have run; importing them runs their code. Built-in
     controllers and those of installed packages need none."""
     trust_robot: tuple[Path, ...] = ()
     """MJCF files of robots, outside of the package's assets, that the files may name."""

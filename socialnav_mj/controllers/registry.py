@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Callable
 from dataclasses import Field, fields, is_dataclass
+from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
 from operator import attrgetter
@@ -21,6 +22,7 @@ from socialnav_mj.controllers.mppi import MPPI
 from socialnav_mj.controllers.orca import ORCA
 from socialnav_mj.controllers.potential_field import PotentialField, PotentialFieldCapped
 from socialnav_mj.controllers.replay_irl import ReplayIRL
+from socialnav_mj.controllers.sb3 import PREFIX, SB3Policy
 from socialnav_mj.controllers.selector import Selector
 from socialnav_mj.controllers.social_force import SocialForce
 from socialnav_mj.controllers.stand_still import StandStill
@@ -59,10 +61,11 @@ def make_controller(spec: str) -> Controller:
     """Make the controller that a name, with settings in brackets if need be, stands for.
 
     Args:
-        spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, or "package.module:Class";
-            keyword arguments of literals may follow, as in "potential_field(repulsion_gain=3.0)". With them a
-            controller is named by the whole spec, so that two configurations can stand in one table; "fast=orca" and
-            "fast=orca(margin=0.1)" name it "fast".
+        spec: A built-in name, an entry point of the group `socialnav_mj.controllers`, "package.module:Class", or
+            "sb3:policy.zip" for a policy of stable-baselines3 (see `socialnav_mj.controllers.sb3`); keyword arguments
+            of literals may follow, as in "potential_field(repulsion_gain=3.0)". With them a controller is named by the
+            whole spec, so that two configurations can stand in one table; "fast=orca" and "fast=orca(margin=0.1)" name
+            it "fast".
 
     Returns:
         A new controller, not yet reset.
@@ -188,7 +191,7 @@ def factory_of(name: str) -> Callable[..., Controller]:
     """The class or function behind a controller's name; imports it if it is not built in.
 
     Args:
-        name: A built-in name, an entry point, or "package.module:Class".
+        name: A built-in name, an entry point, "package.module:Class", or "sb3:policy.zip".
 
     Returns:
         Called with the settings, it returns a controller.
@@ -198,6 +201,8 @@ def factory_of(name: str) -> Callable[..., Controller]:
     """
     if name in BUILT_IN:
         return BUILT_IN[name]
+    if name.startswith(PREFIX):
+        return partial(SB3Policy, path=name.removeprefix(PREFIX))
     if ":" in name:
         return load(name, name)
     for entry in entry_points(group=ENTRY_POINT_GROUP):
@@ -256,6 +261,7 @@ def settings_of(kind: Callable[..., Controller]) -> list[Field[Any]]:
     Returns:
         Those that the dataclass takes when it is called; none if it is no dataclass.
     """
+    kind = kind.func if isinstance(kind, partial) else kind
     return [field for field in fields(kind) if field.init] if is_dataclass(kind) else []
 
 

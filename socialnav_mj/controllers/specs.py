@@ -24,6 +24,29 @@ from socialnav_mj.controllers.registry import (
     settings_of,
     split_label,
 )
+from socialnav_mj.controllers.sb3 import PREFIX, SB3Policy, checksum_of
+
+
+def with_trust(spec: str, trusted: Collection[str]) -> str:
+    """Name in a spec the file that is trusted by its content.
+
+    Args:
+        spec: As `make_controller` takes it.
+        trusted: Specs of policies of stable-baselines3 without settings, as "sb3:policy.zip".
+
+    Returns:
+        The spec with the file's sha256, if it is trusted and has none; else unchanged.
+
+    Raises:
+        ValueError: If the spec or the file cannot be read.
+    """
+    label, plain = split_label(spec)
+    name, config = parse(plain)
+    if not name.startswith(PREFIX) or name not in trusted or "checksum" in config:
+        return spec
+    pinned = {"checksum": checksum_of(name.removeprefix(PREFIX)), **config}
+    return text_of(name, {**pinned, "name": label or config.get("name", spec)})
+
 
 _BESIDE = ("class", "attributes", "sources")
 """Keys of a controller's configuration that are no settings."""
@@ -155,7 +178,7 @@ def controller_of(config: dict[str, Any], *, trusted: Collection[str] = ()) -> C
 
     Args:
         config: As it travels in an episode.
-        trusted: Classes outside of those, as "package.module:Class".
+        trusted: Classes outside of those, as "package.module:Class", and files, as "sb3:policy.zip".
 
     Returns:
         A new controller of the same class and configuration.
@@ -167,6 +190,11 @@ def controller_of(config: dict[str, Any], *, trusted: Collection[str] = ()) -> C
         raise ValueError(f'controller_config = {config!r} is not allowed; allowed: a JSON object with "class"')
     path = config["class"]
     values = {name: value for name, value in config.items() if name not in _BESIDE}
+    if path == class_path(SB3Policy):
+        # The file's code is what has to be trusted, not the class, which is this package's.
+        if f"{PREFIX}{values.get('path')}" not in trusted:
+            raise ValueError(_untrusted(f"{PREFIX}{values.get('path')}"))
+        trusted = (*trusted, path)
     kind = _known_class(path, trusted)
     _check_values(path, kind, values, trusted)
     attributes = config.get("attributes")
