@@ -13,8 +13,9 @@ from socialnav_mj.cli.board import Leaderboard
 from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench, StepSize
+from socialnav_mj.cli.learning import Ship, Train
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
-from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce, Ship, Train
+from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce
 from socialnav_mj.processes import stoppable
 
 Command = (

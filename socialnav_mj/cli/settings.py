@@ -8,6 +8,7 @@ from typing import Annotated, Any, get_type_hints
 import tyro
 
 from socialnav_mj.config import SETTINGS, Robot, Scenario
+from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
 
 _OF_THE_COMMAND = ("share", "seed")
@@ -45,11 +46,17 @@ def _options(kind: type, prefix: str = "") -> dict[str, tuple[Any, Any]]:
     }
 
 
-TrainingSettings = make_dataclass(
-    "TrainingSettings",
-    [(name, *option) for name, option in _options(TrainingConfig).items() if name != "datasets"],
-    frozen=True,
-    kw_only=True,
+TrainingSettings, AttentionSettings = (
+    make_dataclass(
+        name,
+        [(setting, *option) for setting, option in _options(kind).items() if setting not in hidden],
+        frozen=True,
+        kw_only=True,
+    )
+    for name, kind, hidden in (
+        ("TrainingSettings", TrainingConfig, ("datasets",)),
+        ("AttentionSettings", AttentionConfig, ("datasets", "features")),
+    )
 )
 
 _ALL = {**_options(Scenario), **_options(Robot, "robot_")}

@@ -1,83 +1,12 @@
-"""The sub-commands of learning and of many runs: `train`, `ship`, `fit-prediction`, `reproduce`, `leave-one-out`."""
+"""The sub-commands of many runs: `fit-prediction`, `reproduce`, `leave-one-out`, `gains`."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import tyro
+from typing import Any, Literal
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
-from socialnav_mj.cli.console import counted_progress, say
-from socialnav_mj.cli.settings import TrainingSettings
+from socialnav_mj.cli.console import say
 from socialnav_mj.cli.study import run_study
-from socialnav_mj.files import check_output
-from socialnav_mj.learning.config import TrainingConfig
-
-
-@dataclass(frozen=True, kw_only=True)
-class Train:
-    """Learn a reward and a policy from recorded people. If it is interrupted, repeat the command to resume it."""
-
-    method: tyro.conf.Positional[Literal["replay-irl"]]
-    """What to train."""
-    dataset: tuple[str, ...] = ("plaza",)
-    """Recordings to learn from: names in the catalogue, or paths."""
-    data_dir: Folder = None
-    """Where recordings are looked for first."""
-    settings: Annotated[object, tyro.conf.arg(constructor=TrainingSettings)] = field(default_factory=TrainingSettings)
-    """Settings of the training."""
-    out: Folder = None
-    """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
-
-    def run(self) -> None:
-        """Train behind a bar, print every validation, and say where the chosen policy is."""
-        try:
-            from socialnav_mj.learning.training import Progress as Step
-            from socialnav_mj.learning.training import train
-        except ImportError as error:
-            raise RuntimeError(
-                f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
-            ) from error
-        config = TrainingConfig(datasets=self.dataset, **vars(self.settings))
-        label = "+".join(Path(name).stem for name in self.dataset)
-        out = self.out or Path("runs") / "train" / f"{label}_{config.features}_seed{config.seed}"
-        check_output(out)
-        with counted_progress() as progress:
-            bar = progress.add_task("scene steps", total=config.scene_steps)
-
-            def report(step: Step) -> None:
-                progress.update(bar, completed=step.scene_steps)
-                if step.validation is not None:
-                    v = step.validation
-                    say(
-                        f"{step.scene_steps} scene steps, {step.transitions} transitions: validation success "
-                        f"{v['success']:.3f}, share of steps within 1.2 m {v['intrusion_share']:.3f}",
-                        progress.console,
-                    )
-
-            best = train(config, out, data_dir=None if self.data_dir is None else str(self.data_dir), progress=report)
-        say(f"policy: {best}\nuse it: --controllers \"replay_irl(policy='{best}')\"")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ship:
-    """Put finished trainings among the shipped policies, as DATASETS_FEATURES_seedSEED.
-
-    Every card states how the trainings that differ by their seed alone spread.
-    """
-
-    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER")]
-    """Folders that `train` wrote."""
-    out: Folder = None
-    """Folder of policies; the package's own by default."""
-
-    def run(self) -> None:
-        """Copy weights and cards, and print the paths."""
-        from socialnav_mj.controllers.replay_irl import policies_folder
-        from socialnav_mj.learning.shipping import ship
-
-        for path in ship(self.folders, self.out or policies_folder()):
-            say(f"policy: {path}")
 
 
 @dataclass(frozen=True, kw_only=True)

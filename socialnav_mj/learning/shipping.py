@@ -1,26 +1,29 @@
 """From finished trainings to the policies that travel with the package, and how much their seeds matter."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from socialnav_mj.controllers.policy_card import PolicyError
-from socialnav_mj.controllers.replay_irl import load_policy
+from socialnav_mj.controllers.attention import AttentionPolicy, load_attention
+from socialnav_mj.controllers.policy_card import PolicyError, read_card
+from socialnav_mj.controllers.replay_irl import TrainedPolicy, load_policy
 from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.learning.config import TrainingConfig
 
 MEASURES = ("success", "intrusion_share", "time_under_way")
 BEST = "best.safetensors"
+ATTENTION = "attention"
+"""Method in the card of such a policy, and the folder of the shipped ones."""
 
 
 def ship(folders: Sequence[Path], target: Path) -> list[Path]:
     """Put the best policies of finished trainings among others, as DATASETS_FEATURES_seedSEED.
 
-    A turn limit that is not the default one stands before the seed. Trainings that differ in nothing but their seed are
-    a family. Every card of a family gets its `seed_spread`: mean, standard deviation, least and greatest of its
-    members' metrics.
+    Those of `attention` go into the target's folder of that name. A turn limit that is not the default one stands
+    before the seed. Trainings that differ in nothing but their seed are a family. Every card of a family gets its
+    `seed_spread`: mean, standard deviation, least and greatest of its members' metrics.
 
     Args:
         folders: Of `socialnav_mj.learning.training.train`.
@@ -33,12 +36,23 @@ def ship(folders: Sequence[Path], target: Path) -> list[Path]:
         PolicyError: If a training has no policy yet or is not finished, or a policy of the same family's name in the
             target was trained with another configuration; then nothing is written.
     """
+    of_attention = [folder for folder in folders if _is_attention(folder)]
+    others = [folder for folder in folders if folder not in of_attention]
+    paths = _ship(others, target, load_policy) if others else []
+    return paths + (_ship(of_attention, target / ATTENTION, load_attention) if of_attention else [])
+
+
+def _is_attention(folder: Path) -> bool:
+    return bool(read_card((folder / BEST).with_suffix(".json")).get("method") == ATTENTION)
+
+
+def _ship(folders: Sequence[Path], target: Path, load: Callable[[str], TrainedPolicy | AttentionPolicy]) -> list[Path]:
     found: dict[str, tuple[dict[str, Any], bytes | None]] = {
-        path.stem: (load_policy(str(path)).card, None) for path in sorted(target.glob("*.safetensors"))
+        path.stem: (load(str(path)).card, None) for path in sorted(target.glob("*.safetensors"))
     }
     shipped = []
     for folder in folders:
-        card = load_policy(str(folder / BEST)).card
+        card = load(str(folder / BEST)).card
         if "metrics" not in card:
             raise PolicyError(f"{folder}: the training is not finished; run it to its end first")
         config = card["config"]

@@ -1,0 +1,130 @@
+"""The sub-commands of learning: `train` and `ship`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from socialnav_mj.cli.arguments import Folder
+from socialnav_mj.cli.console import counted_progress, say
+from socialnav_mj.cli.settings import AttentionSettings, TrainingSettings
+from socialnav_mj.files import check_output
+from socialnav_mj.learning.attention_config import AttentionConfig
+from socialnav_mj.learning.config import TrainingConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainReplayIRL:
+    """Learn a reward and a policy from recorded people."""
+
+    dataset: tuple[str, ...] = ("plaza",)
+    """Recordings to learn from: names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    settings: Annotated[object, tyro.conf.arg(constructor=TrainingSettings)] = field(default_factory=TrainingSettings)
+    """Settings of the training."""
+    out: Folder = None
+    """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
+
+    def run(self) -> None:
+        """Train behind a bar, print every validation, and say where the chosen policy is."""
+        try:
+            from socialnav_mj.learning.training import train
+        except ImportError as error:
+            raise RuntimeError(_needed(error)) from error
+        config = TrainingConfig(datasets=self.dataset, **vars(self.settings))
+        _run(train, config, self.out or _folder(config), self.data_dir, controller="replay_irl")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainAttention:
+    """Learn a policy that weighs the people around it, by reinforcement in a recorded crowd."""
+
+    dataset: tuple[str, ...] = ("plaza",)
+    """Recordings to learn in: names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    settings: Annotated[object, tyro.conf.arg(constructor=AttentionSettings)] = field(default_factory=AttentionSettings)
+    """Settings of the training."""
+    out: Folder = None
+    """Folder of the training; runs/train/DATASET_people_seedSEED by default."""
+
+    def run(self) -> None:
+        """Train behind a bar, print every validation, and say where the chosen policy is."""
+        try:
+            from socialnav_mj.learning.attention_training import train_attention
+        except ImportError as error:
+            raise RuntimeError(_needed(error)) from error
+        config = AttentionConfig(datasets=self.dataset, **vars(self.settings))
+        _run(train_attention, config, self.out or _folder(config), self.data_dir, controller="attention")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a policy. If it is interrupted, repeat the command to resume it."""
+
+    method: tyro.conf.OmitSubcommandPrefixes[
+        Annotated[TrainReplayIRL, tyro.conf.subcommand("replay-irl")]
+        | Annotated[TrainAttention, tyro.conf.subcommand("attention")]
+    ]
+
+    def run(self) -> None:
+        """Run one of the trainings."""
+        self.method.run()
+
+
+def _needed(error: ImportError) -> str:
+    return f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
+
+
+def _folder(config: TrainingConfig | AttentionConfig) -> Path:
+    label = "+".join(Path(name).stem for name in config.datasets)
+    return Path("runs") / "train" / f"{label}_{config.features}_seed{config.seed}"
+
+
+def _run(
+    train: Callable[..., Path],
+    config: TrainingConfig | AttentionConfig,
+    out: Path,
+    data_dir: Path | None,
+    controller: str,
+) -> None:
+    check_output(out)
+    with counted_progress() as progress:
+        bar = progress.add_task("scene steps", total=config.scene_steps)
+
+        def report(step: Any) -> None:
+            progress.update(bar, completed=step.scene_steps)
+            if step.validation is not None:
+                v = step.validation
+                say(
+                    f"{step.scene_steps} scene steps, {step.transitions} transitions: validation success "
+                    f"{v['success']:.3f}, share of steps within 1.2 m {v['intrusion_share']:.3f}",
+                    progress.console,
+                )
+
+        best = train(config, out, data_dir=None if data_dir is None else str(data_dir), progress=report)
+    say(f"policy: {best}\nuse it: --controllers \"{controller}(policy='{best}')\"")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ship:
+    """Put finished trainings among the shipped policies, as DATASETS_FEATURES_seedSEED.
+
+    Every card states how the trainings that differ by their seed alone spread.
+    """
+
+    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER")]
+    """Folders that `train` wrote."""
+    out: Folder = None
+    """Folder of policies; the package's own by default."""
+
+    def run(self) -> None:
+        """Copy weights and cards, and print the paths."""
+        from socialnav_mj.controllers.replay_irl import policies_folder
+        from socialnav_mj.learning.shipping import ship
+
+        for path in ship(self.folders, self.out or policies_folder()):
+            say(f"policy: {path}")
