@@ -14,8 +14,9 @@ import numpy as np
 from dm_control.rl import control
 
 from socialnav_mj import suite
+from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Limits, make_controller
-from socialnav_mj.environment import make_environment
+from socialnav_mj.environment import build_environment, make_environment
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording
 from socialnav_mj.rollout import rollout
@@ -32,7 +33,13 @@ class Cost:
     episode_cpu: float
     """From reset to the finished `Episode`: physics, contacts, observation, controller, record [s]."""
     physics_cpu: float
-    """Bare `mj_step` calls on the same model, from the same states [s]."""
+    """Bare `mj_step` calls from the same states, in a scene with no more robots than were in use at once [s]."""
+    n_slots: int
+    """Agents that deadlines let be in the scene at once."""
+    n_robots: int
+    """Robots that the episode's scene was built with."""
+    n_used: int
+    """Of them in use at once, at most; with as many the bare steps are made."""
     ratio: float
     """episode_cpu / physics_cpu, the median over repetitions."""
     ratio_low: float
@@ -67,8 +74,11 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
     """
     from socialnav_mj.trace.writer import write_trace  # rerun is slow to import and not needed elsewhere
 
-    environment = suite.load(scenario, {"dataset": recording, "seed": seed})
-    states = _record_states(environment, controller)
+    setting = Scenario(share=suite.SHARES[scenario], seed=seed)
+    environment = build_environment(recording, setting, robots="likely")
+    n_used = max(state["n_used"] for state in _record_states(environment, controller))
+    bare = build_environment(recording, setting, robots=n_used)
+    states = _record_states(bare, controller)
     episode_times, physics_times, save_times, trace_times = [], [], [], []
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "trace.rrd"
@@ -77,7 +87,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
             begin = process_time()
             episode = rollout(environment, make_controller(controller), scenario_name=scenario)
             episode_times.append(process_time() - begin)
-            physics_times.append(_time_bare_steps(environment, states))
+            physics_times.append(_time_bare_steps(bare, states))
             begin = process_time()
             episode.save(Path(folder) / "episode.npz")
             save_times.append(process_time() - begin)
@@ -92,6 +102,9 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
         simulated_time=float(episode.time[-1]),
         episode_cpu=median(episode_times),
         physics_cpu=median(physics_times),
+        n_slots=environment.physics.n_agents,
+        n_robots=environment.physics.model.nu // 2,
+        n_used=n_used,
         ratio=median(ratios),
         ratio_low=min(ratios),
         ratio_high=max(ratios),
@@ -207,7 +220,8 @@ def _record_states(environment: control.Environment, controller_name: str) -> li
         act_cpu = process_time() - begin
         state: dict[str, Any] = {name: getattr(physics.data.ptr, name).copy() for name in _DATA_FIELDS}
         state |= {name: getattr(physics.model.ptr, name).copy() for name in _MODEL_FIELDS}
-        state |= {"act_cpu": act_cpu, "active": int(time_step.observation["active"].sum())}
+        active = np.flatnonzero(time_step.observation["active"])
+        state |= {"act_cpu": act_cpu, "active": len(active), "n_used": int(active.max(initial=0)) + 1}
         time_step = environment.step(action)
         state["ctrl"] = physics.data.ctrl.copy()
         states.append(state)

@@ -3,7 +3,7 @@
 from functools import partial
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from dm_control.rl import control
@@ -84,7 +84,7 @@ def build_environment(
     time_limit: float = float("inf"),
     random: int | np.random.RandomState | None = None,
     environment_kwargs: dict[str, Any] | None = None,
-    grow: bool = False,
+    robots: int | Literal["all", "likely"] = "all",
     replaced: IntArray | None = None,
 ) -> Environment:
     """A dm_control environment of a recording that is at hand and a scenario that is final.
@@ -95,9 +95,9 @@ def build_environment(
         time_limit: The episode is cut after this time [s].
         random: Kept by the task, which draws nothing from it.
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
-        grow: Begin with as many robots as are likely to be in the scene at once, and compile it anew if more are. No
-            bit of an episode depends on it, but who holds on to the model, as dm_control's viewer does, must not see it
-            change.
+        robots: How many are built at first: one for each slot, as many as are likely to be in the scene at once, or a
+            number >= 1. When a slot beyond them is used, the scene is compiled anew with more. No bit of an episode
+            depends on it, but who holds on to the model, as dm_control's viewer does, must not see it change.
         replaced: Indices of the people who become agents, ascending; those of the scenario's draw by default.
 
     Returns:
@@ -113,10 +113,10 @@ def build_environment(
         low=everywhere.min(axis=0),
         high=everywhere.max(axis=0),
     )
+    sizes = {"all": task.cast.n_agent_slots, "likely": task.cast.n_likely_agents}
+    count = robots if isinstance(robots, int) else sizes[robots]
     return Environment(
-        Physics.from_mujoco(
-            build(n_robots=task.cast.n_likely_agents if grow else None), build=lambda n: build(n_robots=n)
-        ),
+        Physics.from_mujoco(build(n_robots=count), build=lambda n: build(n_robots=n)),
         task,
         control_timestep=scenario.control_timestep,
         time_limit=time_limit,

@@ -215,7 +215,7 @@ def _run(job: Job, folder: Path) -> Done:
         if job.controller == HUMAN:
             episode = human_episode(recording, scenario, scenario_name=job.scenario)
         else:
-            environment = build_environment(recording, scenario, grow=True)
+            environment = build_environment(recording, scenario, robots="likely")
             episode = rollout(environment, make_controller(job.controller), scenario_name=job.scenario)
         episode.save(folder / job.file_name)
     except Exception as error:  # noqa: BLE001  whatever it is, it is told and the other episodes go on

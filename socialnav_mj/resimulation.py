@@ -79,7 +79,7 @@ def resimulate(
     controller = controller_of(metadata["controller_config"], trusted=trust.controllers)
     # Half a step before the end, so that rounding cannot add a step.
     limit = (metadata["steps"] - 0.5) * scenario.control_timestep
-    environment = build_environment(recording, scenario, time_limit=limit, grow=True)
+    environment = build_environment(recording, scenario, time_limit=limit, robots="likely")
     return rollout(environment, controller, scenario_name=name)
 
 

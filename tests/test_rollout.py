@@ -78,7 +78,7 @@ def test_size_of_the_pool_changes_no_bit_of_an_episode(pedestrian, slots, robots
 
     monkeypatch.setattr("socialnav_mj.task.cast_recording", other)
     task = environment.task
-    environment = build_environment(task.recording, task.scenario, grow=True)
+    environment = build_environment(task.recording, task.scenario, robots="likely")
     built = [environment.physics.model.nu // 2]
     episode = rollout(environment, PotentialField(), scenario_name="made")
     built.append(environment.physics.model.nu // 2)
@@ -89,7 +89,7 @@ def test_size_of_the_pool_changes_no_bit_of_an_episode(pedestrian, slots, robots
 
 def test_copy_that_cannot_grow_says_so():
     task = busy().task
-    physics = build_environment(task.recording, task.scenario, grow=True).physics
+    physics = build_environment(task.recording, task.scenario, robots="likely").physics
     with pytest.raises(ValueError, match="slot 8 has no robot, and this copy of the physics cannot build one"):
         physics.copy().place_agent(8, np.zeros(2), 0.0)
 

@@ -130,6 +130,7 @@ class Bench:
             table.add_column(cost.scenario, justify="right")
             for label, text in {
                 "agents": f"{cost.n_agents}",
+                "slots / robots built / in use at once": f"{cost.n_slots} / {cost.n_robots} / {cost.n_used}",
                 "simulated [s]": f"{cost.simulated_time:.1f}",
                 "episode CPU [s]": f"{cost.episode_cpu:.2f}",
                 "bare mj_step CPU [s]": f"{cost.physics_cpu:.2f}",

@@ -100,7 +100,7 @@ class Crowd:
                 "agents at once; allow more slots or a smaller share"
             )
         self.limits = Limits.of(scenario)
-        self.environment: Environment = build_environment(recording, scenario, grow=True)
+        self.environment: Environment = build_environment(recording, scenario, robots="likely")
 
     def begin(self) -> dict[str, Values]:
         """Begin the scene.

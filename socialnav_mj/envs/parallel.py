@@ -103,7 +103,7 @@ class CrowdParallelEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         draw = int((options or {}).get("draw", self._random.integers(2**31)))
         scenario = self.settings.scenario.changed(seed=draw)
         self._draw, self._limits = draw, Limits.of(scenario)
-        self._environment = build_environment(self.settings.recording, scenario, grow=True)
+        self._environment = build_environment(self.settings.recording, scenario, robots="likely")
         self._environment.reset()
         cast = self._environment.task.cast
         # Ranks by appearance; the sort is stable, so those who appear together keep the recording's order.

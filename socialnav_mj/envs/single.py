@@ -90,7 +90,7 @@ class CrowdEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         end = self._begin + (scenario.allowed_steps(distance) + 1) * step + scenario.deadline_base
         scene = excerpt(recording, self._begin, end)
         robots = np.isin(scene.ids, self._person if self._others is None else ids)
-        environment = build_environment(scene, scenario, replaced=np.flatnonzero(robots), grow=True)
+        environment = build_environment(scene, scenario, replaced=np.flatnonzero(robots), robots="likely")
         self._environment = environment
         self._limits = Limits.of(scenario)
         if self._others is not None:
