@@ -16,6 +16,7 @@ from socialnav_mj.geometry import to_agent_frame
 from socialnav_mj.metrics.outcomes import success
 
 LAYERS = tuple((np.ascontiguousarray(w.T), b) for w, b in load_policy("students003_continuous_seed0").reward)
+TOP = 0.2
 SCALE = np.where(np.arange(16) % 4 == 3, 0.5, 0.0)
 
 
@@ -24,7 +25,7 @@ def asked(seed):
     plans, speed, yaw_rate, goal, crowd, terms = random_problem(seed)
     states = np.full((*plans.shape[:2], 16, 6), np.nan)
     base, _ = plan_costs(plans, speed, yaw_rate, goal, crowd, terms, states)
-    return base, states, goal, crowd.x, crowd.y, terms.step, SCALE, LAYERS
+    return base, states, goal, crowd.x, crowd.y, terms.step, SCALE, TOP, LAYERS
 
 
 def test_formulas_are_numpys_to_the_stated_accuracy():
@@ -35,9 +36,9 @@ def test_formulas_are_numpys_to_the_stated_accuracy():
 
 
 def test_what_a_plan_lacks_in_reward_is_that_of_the_features_an_agent_would_see():
-    base, states, goal, x, y, step, scale, layers = asked(0)
+    base, states, goal, x, y, step, scale, top, layers = asked(0)
     policy, features = load_policy("students003_continuous_seed0"), Continuous()
-    found = learned.learned_costs(base, states, goal, x, y, step, scale, layers) - base
+    found = learned.learned_costs(base, states, goal, x, y, step, scale, top, layers) - base
     expected = np.zeros_like(base)
     for i, q in np.ndindex(base.shape):
         for k in (3, 7, 11, 15):
@@ -55,7 +56,7 @@ def test_what_a_plan_lacks_in_reward_is_that_of_the_features_an_agent_would_see(
                 present=np.ones((1, x.shape[2]), dtype=bool),
             )
             reward = policy.reward_of(running_state(features(view)))[0]
-            expected[i, q] += scale[k] * 0.5 * (1.0 - reward)
+            expected[i, q] += scale[k] * max(top - reward, 0.0)
     assert expected.max() > 2.0 * expected.min()
     np.testing.assert_allclose(found, expected, atol=1e-7)
 

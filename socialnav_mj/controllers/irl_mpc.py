@@ -13,6 +13,7 @@ from socialnav_mj.controllers.planning.search import Costs
 from socialnav_mj.controllers.planning.terms import Crowd
 from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, TrainedPolicy, load_policy
+from socialnav_mj.features import GOAL_FLAG, absorbing_state
 from socialnav_mj.geometry import Array
 
 FEATURES = "continuous"
@@ -23,9 +24,9 @@ FEATURES = "continuous"
 class IRLMPC(MPC):
     """Weighs plans by time, clearance and entrances as `mpc` does, and by what ReplayIRL's reward network says.
 
-    The reward is asked for every 0.8 s along a plan, of the state that the agent would see then. What it lacks to its
-    greatest value costs time: `learned_weight` x (1 - reward) / 2 a second, decaying with the time ahead as the zone's
-    cost does.
+    The reward is asked for every 0.8 s along a plan, of the state that the agent would see then. What it is short of
+    the reward of being at the goal costs `learned_weight` times as much a second, decaying with the time ahead as the
+    zone's cost does.
     """
 
     preset: Preset = "free"
@@ -35,7 +36,7 @@ class IRLMPC(MPC):
     checksum: str | None = None
     """sha256 that the weights must have; None takes them as they are. It travels in every episode."""
     learned_weight: float = 1.0
-    """Cost of a second with the least reward instead of the greatest, >= 0 [1]."""
+    """Cost of a second in which the reward is 1 less than at the goal, >= 0 [1]."""
     name: str = "irl_mpc"
     _trained: TrainedPolicy = field(init=False, repr=False, compare=False)
 
@@ -64,17 +65,19 @@ class IRLMPC(MPC):
         """
         super().reset(limits, seed=seed)
         self._layers = tuple((np.ascontiguousarray(weight.T), bias) for weight, bias in self._trained.reward)
+        at_goal = absorbing_state(self._trained.features.size, GOAL_FLAG)[None]
+        self._top = float(self._trained.reward_of(at_goal)[0])
         asked = np.arange(STEPS) % learned.STRIDE == learned.STRIDE - 1
         self._scale: Array = np.where(asked, self.learned_weight * learned.STRIDE * self._terms.zone_time, 0.0)
 
     def _costs(self, speed: Array, yaw_rate: Array, goal: Array, crowd: Crowd) -> Costs:
-        most = float(self._scale.sum())
+        most = float(self._scale.sum()) * (1.0 + self._top)
 
         def costs(plans: Array, best: Array) -> tuple[Array, Array]:
             states = np.full((*plans.shape[:2], STEPS, 6), np.nan)
             # The reward may turn the order by as much as it can cost.
             base, clearance = costs_of(plans, speed, yaw_rate, goal, crowd, self._terms, best.copy(), most, states)
-            asked = (base, states, goal, crowd.x, crowd.y, self._terms.step, self._scale, self._layers)
+            asked = (base, states, goal, crowd.x, crowd.y, self._terms.step, self._scale, self._top, self._layers)
             loops = learned.compiled()
             return (learned.learned_costs(*asked) if loops is None else loops(*asked, best.copy())), clearance
 

@@ -128,7 +128,8 @@ def loop_costs(
         crowd: As there.
         terms: As there.
         best: (n, b) least costs of each agent so far, ascending, infinite if there are fewer; brought up to date.
-        slack: A plan is given up when it must cost more than this above the greatest of `best` [s].
+        slack: What whoever asks may add to a cost: a plan is given up when it must cost more than `best` held at first,
+            or more than this above the greatest of `best` [s].
         states: As there.
 
     Returns:
@@ -142,6 +143,7 @@ def loop_costs(
     near, count = np.empty((steps, others), dtype=np.int64), np.empty(steps, dtype=np.int64)
     cut, worst = np.empty((steps, others)), np.empty(others)
     for i in range(n):
+        worst_kept = best[i, -1]
         stride = _larger(abs(speed[i]), terms.max_speed) * terms.step + 1e-6
         for k in range(steps):
             count[k] = 0
@@ -216,7 +218,7 @@ def loop_costs(
                 # A robot that was thrown is faster than its limit: then the way that is left promises nothing.
                 left = remaining if v <= terms.max_speed else 0.0
                 least = time + (left - terms.arrival_distance) / terms.max_speed + 0.5 * (total + most) + within
-                if least > best[i, -1] + slack + 1e-6:
+                if least > _smaller(worst_kept, best[i, -1] + slack) + 1e-6:
                     given_up = True
                     break
             if given_up:
