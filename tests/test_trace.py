@@ -258,8 +258,10 @@ def test_scores_are_shown_where_there_are_any_and_a_name_may_hold_anything(path:
     assert not [entity for entity in read(path)[1] if "/score" in entity]
     specs = ("mpc(preset='calm')", "a/b: \\ c")
     other = write_trace(replace(scored(), policies=specs), tmp_path / "specs.rrd")
-    entities = {entity for entity in read(other)[1] if entity.startswith("/all/score/")}
-    assert entities == {f"/all/score/{rr.escape_entity_path_part(spec)}" for spec in specs}
+    twins = write_trace(replace(scored(), policies=("mpc", "mpc")), tmp_path / "twins.rrd")
+    for file, labels in ((other, specs), (twins, ("mpc 0", "mpc 1"))):
+        entities = {entity for entity in read(file)[1] if entity.startswith("/all/score/")}
+        assert entities == {f"/all/score/{rr.escape_entity_path_part(label)}" for label in labels}
     blueprint = list(RrdReader(other).blueprints())
     text = repr([c.to_record_batch().to_pydict() for c in RrdReader(other).stream(store=blueprint[0]).to_chunks()])
     assert "/chosen/score" in text and "/all/score" in text

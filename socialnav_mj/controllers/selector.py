@@ -19,9 +19,13 @@ class Selector(SwitchingController):
     planners go on planning from their own last plan, whoever drives.
     """
 
-    calm: MPC = field(default_factory=lambda: MPC(preset="calm"), metadata={IS_CONTROLLER: True})
+    calm: MPC = field(
+        default_factory=lambda: MPC(preset="calm", name="mpc(preset='calm')"), metadata={IS_CONTROLLER: True}
+    )
     """What drives as long as it is safe enough."""
-    free: MPC = field(default_factory=lambda: MPC(preset="free"), metadata={IS_CONTROLLER: True})
+    free: MPC = field(
+        default_factory=lambda: MPC(preset="free", name="mpc(preset='free')"), metadata={IS_CONTROLLER: True}
+    )
     """What drives otherwise."""
     tolerance: float = 0.15
     """By how much the calm plan's clearance cost may exceed the free plan's, >= 0; chosen on draws 0-9 [s]."""

@@ -180,14 +180,15 @@ def _scores(episode: Episode, sink: Sink, chosen: IntArray) -> None:
     if episode.agent_scores is None or not episode.n_agents:
         return
     people, colours = episode.agent_person, look.policy_colours(episode.policies)
-    every = [f"robot {person}" for person in people]
-    for p, (policy, colour) in enumerate(zip(episode.policies, colours, strict=True)):
+    every, policies = [f"robot {person}" for person in people], episode.policies
+    labels = [name if policies.count(name) == 1 else f"{name} {p}" for p, name in enumerate(policies)]
+    for p, (policy, colour) in enumerate(zip(labels, colours, strict=True)):
         entity = f"/all/score/{rr.escape_entity_path_part(policy)}"
         sink.static(entity, rr.SeriesLines(names=every, widths=[0.7] * len(every), colors=[colour] * len(every)))
         sink.columns(entity, episode.time, rr.Scalars.columns(scalars=episode.agent_scores[..., p].astype(float)))
     for agent in chosen:
         window, entity = episode.window(agent), f"/chosen/score/robot_{people[agent]}"
-        names = [f"robot {people[agent]} {policy}" for policy in episode.policies]
+        names = [f"robot {people[agent]} {policy}" for policy in labels]
         sink.static(entity, rr.SeriesLines(names=names, colors=colours, widths=[2.0] * len(names)))
         own = episode.agent_scores[window, agent].astype(float)
         sink.columns(entity, episode.time[window], rr.Scalars.columns(scalars=own))
