@@ -94,7 +94,7 @@ def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(c
     assert max(map(len, output.splitlines())) <= 80
     for name in ("tiny (text), scenario_1", "potential_field", "go_straight", "human", "success", "path"):
         assert name in output
-    assert "report: runs/tiny/report.md\ntraces: runs/tiny/traces (open with: rerun FILE.rrd)" in output
+    assert "report: runs/tiny/report.html (report.md beside it)\ntraces: socialnav-mj view runs/tiny" in output
     folder = Path("runs/tiny")
     assert {path.name for path in folder.iterdir()} >= {
         *("agents.parquet", "summary.csv", "summary.json", "report.md", "run.json", "episodes", "traces")

@@ -215,7 +215,7 @@ def test_traces_show_the_first_draw_of_every_scenario_and_controller(run):
 def test_equal_episodes_give_equal_bytes_whatever_the_number_of_processes(run):
     writer.write_report(run)
     before = outputs(run)
-    assert set(before) == {"agents.parquet", "summary.csv", "summary.json", "report.md", "run.json"}
+    assert set(before) == {"agents.parquet", "summary.csv", "summary.json", "report.html", "report.md", "run.json"}
     writer.write_report(run, n_jobs=2)
     assert outputs(run) == before
 

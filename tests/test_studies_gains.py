@@ -99,6 +99,7 @@ def test_command_runs_and_publishes_no_episode(policy, tmp_path, capsys):
     main([*command, "--draws", "1", "--jobs", "1", "--out", str(out), "--publish", str(public)])
     assert "report:" in capsys.readouterr().out
     assert sorted(path.name for path in public.iterdir()) == ["README.md", "figures", "provenance.json", "tables"]
+    assert 'src="data:image/svg+xml' in (out / "report.html").read_text()
     rows = list(csv.DictReader((public / "tables" / "gains.csv").open()))
     assert len(rows) == 2 * 3 * 2 and {row["form"] for row in rows} == set(FORMS)
     page = (public / "README.md").read_text()

@@ -225,6 +225,7 @@ def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
     main([*command, "--out", str(out), "--publish", str(public)])
     assert "leaderboard:" in capsys.readouterr().out
     assert sorted(path.name for path in public.iterdir()) == ["README.md", "figures", "provenance.json", "tables"]
+    assert 'src="data:image/svg+xml' in (out / "report.html").read_text()
     rows = list(csv.DictReader((public / "tables" / "leaderboard.csv").open()))
     assert {row["controller"] for row in rows} == {"go_straight", "potential_field", "social_force", "human"}
     ranked = [row for row in rows if row["measure"] == "success" and row["controller"] != "human"]

@@ -181,6 +181,7 @@ def test_command_goes_on_and_publishes_no_episode(recordings, policies, tmp_path
 
     files = {str(path.relative_to(public)) for path in public.rglob("*") if path.is_file()}
     assert files == {"README.md", "provenance.json", "tables/leave_one_out.csv"}
+    assert "Where every row comes from" in (out / "report.html").read_text()
     provenance = json.loads((public / "provenance.json").read_text())
     assert [recording["name"] for recording in provenance["recordings"]] == list(NAMES)
     assert list(provenance["runs"]) == list(NAMES) and set(provenance["policies"]) == set(policies)

@@ -165,6 +165,9 @@ def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsy
     assert sorted(path.name for path in public.iterdir()) == sorted(
         ["README.md", "claims.md", "figures", "provenance.json", "tables"]
     )
+    shown = (out / "report.html").read_text()
+    assert 'href="claims.html"' in shown and "socialnav-mj view runs/default/episodes/" in shown
+    assert (out / "claims.html").is_file()
     assert not list(public.rglob("*.npz")) and not list(public.rglob("*.parquet"))
     assert {p.name for p in public.glob("tables/*")} == {
         "levels.csv",

@@ -346,7 +346,7 @@ def test_nothing_to_verify_is_an_error(tmp_path: Path) -> None:
 def test_command_exits_1_if_a_file_differs(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["verify", str(run), "--jobs", "1"]
     main([*command, "--dataset", TINY])
-    assert "11 of 11 files say what their re-simulation says" in " ".join(capsys.readouterr().out.split())
+    assert "12 of 12 files say what their re-simulation says" in " ".join(capsys.readouterr().out.split())
     with pytest.raises(SystemExit) as end:
         main(command)
-    assert end.value.code == 1 and "7 of 11" in " ".join(capsys.readouterr().out.split())
+    assert end.value.code == 1 and "8 of 12" in " ".join(capsys.readouterr().out.split())

@@ -90,7 +90,7 @@ class Evaluate:
         with errors.status("tables and traces"):
             report = write_report(out, n_jobs=self.jobs)
         show(report.estimates)
-        say(f"report: {report.path}\ntraces: {out / 'traces'} (open with: rerun FILE.rrd)")
+        say(_told_where(report.page, out))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +112,11 @@ class Report:
 
         report = write_report(self.folder, dialects=self.dialect, n_jobs=self.jobs)
         show(report.estimates)
-        say(f"report: {report.path}\ntraces: {self.folder / 'traces'} (open with: rerun FILE.rrd)")
+        say(_told_where(report.page, self.folder))
+
+
+def _told_where(page: Path, folder: Path) -> str:
+    return f"report: {page} (report.md beside it)\ntraces: socialnav-mj view {shlex.quote(str(folder))}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, TypeVar
 
 from socialnav_mj.provenance import differences
 from socialnav_mj.recordings.known import crowd_of, is_simulated
@@ -13,7 +13,7 @@ from socialnav_mj.report.estimates import MEASURES, Estimate
 from socialnav_mj.report.intervals import LEAST, ONE_RECORDING
 from socialnav_mj.report.markdown import bounds, code, head, interval, number, plain, row
 
-_COLUMNS = (
+SHOWN = (
     col.SUCCESS,
     col.SUCCESS_IF_GHOSTS_COUNT,
     col.FIRST_HIT_PEDESTRIAN,
@@ -27,11 +27,17 @@ _COLUMNS = (
     col.INTRUSION_SHARE_OF_STEPS,
     col.AVERAGE_SPEED,
 )
-"""Measures in report.md; all are in summary.csv."""
+"""Measures in report.md and report.html; all are in summary.csv."""
+
+Other = TypeVar("Other")
+"""A table that is no Markdown."""
+
+_CELLS = """\
+Every cell is the mean over draws ± its standard error; a draw is one random choice of the people who are replaced, \
+and its mean over agents is one number. """
 
 _HOW_TO_READ = f"""\
-Every cell is the mean over draws ± its standard error; a draw is one random choice of the people who are replaced, \
-and its mean over agents is one number. The 95 % interval is Student's over draws, for shares Wilson's with the number \
+The 95 % interval is Student's over draws, for shares Wilson's with the number \
 of agents that the spread between draws is worth (none for fewer than {LEAST} draws); where all draws have the same \
 share, it stands in place of the error. {ONE_RECORDING} Controllers that share draws drove the same agents, so compare \
 them draw by draw (`agents.parquet`). All other measures, defined in docs/metrics.md, are in `summary.csv`; every \
@@ -67,13 +73,36 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
     Returns:
         The text of report.md.
     """
+    tables = [_table(rows) for _, rows in by_scenario(estimates)]
+    return "\n".join(report_blocks(summary, estimates, tables, sections, cells=_CELLS))
+
+
+def report_blocks(
+    summary: dict[str, Any],
+    estimates: Sequence[Estimate],
+    tables: Sequence[Other],
+    sections: Sequence[str],
+    *,
+    cells: str,
+) -> list[str | Other]:
+    """What a page about a run consists of.
+
+    Args:
+        summary: See `report_page`.
+        estimates: See `report_page`.
+        tables: One for each of `by_scenario`.
+        sections: See `report_page`.
+        cells: What stands in a table's cells, as Markdown.
+
+    Returns:
+        Markdown, and the tables in their places.
+    """
     lines = ["# Report", ""]
     lines += [f"Command: {code(summary['command'])}" if summary["command"] else "Command: not recorded (no run.json)."]
     lines += ["", "Made from the episode files alone; `socialnav-mj report FOLDER` makes it again.", ""]
     lines += [f"**Warning**: {plain(warning)}.\n" for warning in summary["warnings"]]
-    shown = [MEASURES[name] for name in _COLUMNS]
-    headings = ["controller", shown[0].heading, "95 % interval", *(measure.heading for measure in shown[1:])]
-    for (dataset, variant, scenario), rows in by_scenario(estimates):
+    blocks: list[str | Other] = []
+    for ((dataset, variant, scenario), _), table in zip(by_scenario(estimates), tables, strict=True):
         share = next(
             g["scenario_configuration"]["share"]
             for g in summary["groups"]
@@ -83,17 +112,21 @@ def report_page(summary: dict[str, Any], estimates: Sequence[Estimate], sections
             f"## {plain(f'{crowd_of(dataset, variant)}, {scenario}')}: {100 * share:g} % of the people replaced",
             "",
         ]
-        lines += head([*headings, "draws", "agents"])
-        for controller, own in rows:
-            cells = [with_error(own[measure.name], measure.digits) for measure in shown]
-            counts = [str(own["success"].n_draws), str(own["success"].n_agents)]
-            lines.append(
-                row([controller, cells[0], bounds(own["success"].low, own["success"].high), *cells[1:], *counts])
-            )
-        lines.append("")
-    lines += sections
-    lines += ["## How to read it", "", _HOW_TO_READ.replace("{people}", _people(summary)), *_traceability(summary)]
-    return "\n".join(lines) + "\n"
+        blocks += ["\n".join(lines), table]
+        lines = [""]
+    lines += [*sections, "## How to read it", "", cells + _HOW_TO_READ.replace("{people}", _people(summary)), *_traceability(summary)]
+    return [*blocks, "\n".join(lines) + "\n"]
+
+
+def _table(rows: Sequence[tuple[str, dict[str, Estimate]]]) -> str:
+    """Controllers of a scenario."""
+    shown = [MEASURES[name] for name in SHOWN]
+    lines = head(["controller", shown[0].heading, "95 % interval", *(m.heading for m in shown[1:]), "draws", "agents"])
+    for controller, own in rows:
+        cells = [with_error(own[measure.name], measure.digits) for measure in shown]
+        counts = [str(own["success"].n_draws), str(own["success"].n_agents)]
+        lines.append(row([controller, cells[0], bounds(own["success"].low, own["success"].high), *cells[1:], *counts]))
+    return "\n".join(lines)
 
 
 def _people(summary: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Figure of agents beside the people they replaced; readable in greyscale: controllers differ in mark and grey."""
+"""Figure of agents beside the people they replaced; controllers differ in colour, mark and lightness."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ PANELS = (
 LEGEND_WIDTH = 120
 """Characters that fit beside each other; every entry has a mark and a margin, 8 wide."""
 _MARKS = "osD^vPX<>*"
-_GREYS = ("0.0", "0.45", "0.7", "0.25", "0.6")
+_COLOURS = ("#DDAA33", "#004488", "#BB5566", "#55AAAA", "#762A83", "#88BB44", "#000000")
 
 
 def draw_paired(differences: Sequence[Estimate], folder: Path) -> list[Path]:
@@ -39,13 +39,14 @@ def draw_paired(differences: Sequence[Estimate], folder: Path) -> list[Path]:
     controllers = list(dict.fromkeys(e.controller for e in shown))
     with style():
         columns = max(1, min(5, len(controllers), LEGEND_WIDTH // (max(map(len, controllers)) + 8)))
-        figure = new_figure(4.6 + 0.17 * math.ceil(len(controllers) / columns))
+        figure = new_figure(4.8 + 0.17 * math.ceil(len(controllers) / columns))
         for (measure, label), axes in zip(PANELS, figure.subplots(2, 2).flat, strict=True):
             _draw(axes, [e for e in shown if e.measure == measure], places, controllers)
             axes.set_ylabel(label)
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=columns)
-        figure.supxlabel("agent minus the person it replaced; bars: 95 % interval over draws", fontsize=8.0)
+        title = "Agents minus the people they replaced"  # above the legend: a title of the figure would lie under it
+        figure.legend(handles, labels, loc="outside upper center", ncols=columns, title=title, title_fontsize=9.5)
+        figure.supxlabel("0: as the person itself; bars: 95 % interval over draws", fontsize=8.0)
         return save(figure, folder, "paired_humans")
 
 
@@ -64,7 +65,7 @@ def _draw(axes: Any, shown: Sequence[Estimate], places: Sequence[tuple[str, ...]
             [e.mean for e in own],
             yerr=[low, high],
             fmt=_MARKS[i % len(_MARKS)],
-            color=_GREYS[i % len(_GREYS)],
+            color=_COLOURS[i % len(_COLOURS)],
             markeredgecolor="0.0",
             linewidth=1.0,
             label=controller,

@@ -1,4 +1,4 @@
-"""Run folder -> agents.parquet, summaries, report.md, tables, figures and traces; everything but the episodes."""
+"""Run folder -> agents.parquet, summaries, reports, tables, figures and traces; everything but the episodes."""
 
 import json
 from collections.abc import Sequence
@@ -14,13 +14,18 @@ from socialnav_mj.files import csv_bytes, write_whole
 from socialnav_mj.report.agents import Source
 from socialnav_mj.report.dialects import dialect_estimates
 from socialnav_mj.report.estimates import Estimate, summarise
+from socialnav_mj.report.html import html_page
 from socialnav_mj.report.page import report_page
 from socialnav_mj.report.paired import paired_differences
 from socialnav_mj.report.power import resolutions
 from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.report.run_file import RUN_FILE, RunFile, read_run_file
+from socialnav_mj.report.run_tables import run_blocks
 from socialnav_mj.report.sections import draws_section, fault_section, paired_section, severity_section
 from socialnav_mj.report.summary import summary_of
+
+PAGE = "report.html"
+"""Beside report.md."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +34,8 @@ class Report:
 
     path: Path
     """Of report.md."""
+    page: Path
+    """Of report.html."""
     estimates: tuple[Estimate, ...]
     """In the order of the tables."""
 
@@ -67,8 +74,9 @@ def write_report(folder: str | Path, *, dialects: Sequence[str] = (), n_jobs: in
     for name, content in files.items():
         write_whole(folder / name, content)
     draw_paired(differences, folder / "figures")
+    write_whole(folder / PAGE, _page(folder, run, results, estimates, differences))
     _write_traces(folder, results.sources)
-    return Report(path=folder / "report.md", estimates=tuple(estimates))
+    return Report(path=folder / "report.md", page=folder / PAGE, estimates=tuple(estimates))
 
 
 def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
@@ -79,7 +87,7 @@ def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
         n_jobs: Processes that read episodes.
 
     Returns:
-        Content by name of the file in the folder.
+        Content by name of the file in the folder. The figures in report.html are those that are there.
 
     Raises:
         FileNotFoundError: If there is no episode.
@@ -88,7 +96,9 @@ def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
     """
     run = read_run_file(Path(folder) / RUN_FILE)
     results = _results(Path(folder), run, n_jobs, anew=True)
-    return _tables(run, results, summarise(results.agents), paired_differences(results.agents))
+    estimates, differences = summarise(results.agents), paired_differences(results.agents)
+    page = _page(Path(folder), run, results, estimates, differences)
+    return _tables(run, results, estimates, differences) | {PAGE: page}
 
 
 def _results(folder: Path, run: RunFile | None, n_jobs: int, *, anew: bool = False) -> Results:
@@ -99,12 +109,7 @@ def _tables(
     run: RunFile | None, results: Results, estimates: Sequence[Estimate], differences: Sequence[Estimate]
 ) -> dict[str, bytes]:
     summary = summary_of(results, estimates, None if run is None else run.command)
-    sections = [
-        *paired_section(differences, "figures/paired_humans.svg"),
-        *fault_section(results.agents, results.contacts, results.overlaps),
-        *severity_section(results.contacts),
-        *draws_section(resolutions(results.agents)),
-    ]
+    sections = _sections(results, differences)
     return {
         "agents.parquet": _parquet(results.agents),
         "tables/collisions.parquet": _parquet(results.contacts),
@@ -113,6 +118,26 @@ def _tables(
         "summary.json": (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode(),
         "report.md": report_page(summary, estimates, sections).encode(),
     }
+
+
+def _sections(results: Results, differences: Sequence[Estimate]) -> list[str]:
+    return [
+        *paired_section(differences, "figures/paired_humans.svg"),
+        *fault_section(results.agents, results.contacts, results.overlaps),
+        *severity_section(results.contacts),
+        *draws_section(resolutions(results.agents)),
+    ]
+
+
+def _page(
+    folder: Path,
+    run: RunFile | None,
+    results: Results,
+    estimates: Sequence[Estimate],
+    differences: Sequence[Estimate],
+) -> bytes:
+    """report.html with the figures that are in the folder."""
+    return html_page(run_blocks(results, estimates, _sections(results, differences), run), folder)
 
 
 def _csv(estimates: Sequence[Estimate]) -> bytes:

@@ -13,9 +13,30 @@ from socialnav_mj.files import csv_bytes, write_json, write_whole
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import Recording
 from socialnav_mj.recordings.known import is_simulated
+from socialnav_mj.report.blocks import Table
+from socialnav_mj.report.html import html_page
+from socialnav_mj.report.origins import origins_table
 from socialnav_mj.report.results import Results
 from socialnav_mj.studies.levels import Level
-from socialnav_mj.studies.study import Study
+from socialnav_mj.studies.study import Study, run_folder
+
+
+def write_pages(out: Path, text: str, results: Mapping[str, Results], *, command: str) -> Path:
+    """Write a study's page, README.md to be kept with the project and report.html to be looked at.
+
+    Args:
+        out: Folder of the study; its figures are there.
+        text: Markdown.
+        results: Of each run; report.html says of each of their rows where it comes from.
+        command: That made the study.
+
+    Returns:
+        Path of README.md.
+    """
+    origins = origins_table(results, run_folder(Path(), "{run}").as_posix() + "/episodes/{file}", command)
+    blocks: list[str | Table] = [text, "## Where every row comes from", origins]
+    write_whole(out / "report.html", html_page(blocks, out))
+    return write_whole(out / "README.md", text.encode())
 
 
 def provenance_of(study: Study, results: Mapping[str, Results], *, command: str) -> dict[str, Any]:

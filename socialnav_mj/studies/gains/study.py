@@ -10,11 +10,10 @@ from scipy.stats import qmc
 
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.results import Results
-from socialnav_mj.studies.files import write_csv, write_provenance
+from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
 from socialnav_mj.studies.gains.figure import draw_gains
 from socialnav_mj.studies.gains.page import gains_page
 from socialnav_mj.studies.gains.ranges import Sweep, sweep_of
@@ -126,7 +125,7 @@ def write_gain_sweep(study: GainSweep, out: Path, *, command: str, n_jobs: int =
 
     Args:
         study: That was run by `study.reproduce`.
-        out: Its folder; gets tables/, figures/, README.md and provenance.json.
+        out: Its folder; gets tables/, figures/, README.md, report.html and provenance.json.
         command: That made it.
         n_jobs: Processes that score episodes.
 
@@ -144,7 +143,8 @@ def write_gain_sweep(study: GainSweep, out: Path, *, command: str, n_jobs: int =
     draw_gains(sweeps, out / "figures")
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     provenance = write_provenance(study, results, recordings, out, command=command)
-    return write_whole(out / "README.md", gains_page(sweeps, ranges=RANGES, provenance=provenance).encode())
+    page = gains_page(sweeps, ranges=RANGES, provenance=provenance)
+    return write_pages(out, page, results, command=command)
 
 
 def _sweeps(study: GainSweep, results: Mapping[str, Results]) -> list[Sweep]:

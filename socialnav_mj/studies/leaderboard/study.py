@@ -6,11 +6,10 @@ from pathlib import Path
 
 from socialnav_mj.controllers import BUILT_IN, with_policy_of, with_training
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.results import Results
-from socialnav_mj.studies.files import write_csv, write_provenance
+from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
 from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
 from socialnav_mj.studies.leaderboard.families import compare, families_of
@@ -108,7 +107,7 @@ def write_leaderboard(
 
     Args:
         study: That was run by `study.reproduce`.
-        out: Its folder; gets tables/, figures/, README.md and provenance.json.
+        out: Its folder; gets tables/, figures/, README.md, report.html and provenance.json.
         command: That made it.
         n_jobs: Processes that score episodes.
         costs: CPU time of controllers over that of the physics, as `bench --controllers` measures it.
@@ -131,7 +130,7 @@ def write_leaderboard(
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     provenance = write_provenance(study, results, recordings, out, command=command)
     page = leaderboard_page(boards, families=families, costs=costs or {}, provenance=provenance)
-    return write_whole(out / "README.md", page.encode())
+    return write_pages(out, page, results, command=command)
 
 
 def _boards(study: Leaderboard, results: Mapping[str, Results]) -> list[Board]:

@@ -6,11 +6,10 @@ from pathlib import Path
 
 from socialnav_mj.controllers.replay_irl import load_policy, shipped_policies
 from socialnav_mj.evaluation import Evaluation
-from socialnav_mj.files import write_whole
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.results import Results
-from socialnav_mj.studies.files import level_rows, write_csv, write_provenance
+from socialnav_mj.studies.files import level_rows, write_csv, write_pages, write_provenance
 from socialnav_mj.studies.held_out import IN_SAMPLE, learned_from, period_of_people, recording_name
 from socialnav_mj.studies.leave_one_out.comparison import SideBySide, learned_method, side_by_side
 from socialnav_mj.studies.leave_one_out.page import leave_one_out_page
@@ -141,7 +140,7 @@ def write_leave_one_out(study: LeaveOneOut, out: Path, *, command: str, n_jobs: 
 
     Args:
         study: That was run by `study.reproduce`.
-        out: Its folder; gets tables/leave_one_out.csv, README.md and provenance.json.
+        out: Its folder; gets tables/leave_one_out.csv, README.md, report.html and provenance.json.
         command: That made it.
         n_jobs: Processes that score episodes.
 
@@ -166,7 +165,8 @@ def write_leave_one_out(study: LeaveOneOut, out: Path, *, command: str, n_jobs: 
         rows += level_rows(side.differences, recording=side.recording, role="difference")
     write_csv(out / "tables" / "leave_one_out.csv", rows)
     provenance = write_provenance(study, results, recordings, out, command=command)
-    return write_whole(out / "README.md", leave_one_out_page(compared, provenance=provenance).encode())
+    page = leave_one_out_page(compared, provenance=provenance)
+    return write_pages(out, page, results, command=command)
 
 
 def _compare(study: LeaveOneOut, run: Run, results: Results, recording: Recording) -> SideBySide:

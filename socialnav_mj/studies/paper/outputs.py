@@ -12,9 +12,10 @@ from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
+from socialnav_mj.report.html import html_page
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.results import Results
-from socialnav_mj.studies.files import level_rows, provenance_of, write_csv
+from socialnav_mj.studies.files import level_rows, provenance_of, write_csv, write_pages
 from socialnav_mj.studies.findings import Finding, examine
 from socialnav_mj.studies.held_out import held_out_levels, period_of_people
 from socialnav_mj.studies.levels import Level, LevelTable, levels
@@ -44,7 +45,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
 
     Args:
         experiment: That was run by `study.reproduce`.
-        out: Its folder; gets tables/, figures/, claims.md, README.md and provenance.json.
+        out: Its folder; gets tables/, figures/, claims and README as Markdown and HTML, and provenance.json.
         command: That made it.
         n_jobs: Processes that score episodes.
 
@@ -60,7 +61,9 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
     _write_tables(found, out / "tables")
     _draw(experiment, found, out / "figures")
     titles = {variant.name: variant.title for variant in experiment.settings}
-    write_whole(out / "claims.md", claims_page(found.findings, titles=titles, command=command).encode())
+    claims = claims_page(found.findings, titles=titles, command=command)
+    write_whole(out / "claims.md", claims.encode())
+    write_whole(out / "claims.html", html_page([claims], out))
     provenance = provenance_of(experiment, found.results, command=command)
     provenance["recording"] = recording_metadata(found.recording)
     write_json(out / "provenance.json", provenance)
@@ -72,7 +75,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         has_variants=experiment.variants,
         provenance=provenance,
     )
-    return write_whole(out / "README.md", page.encode())
+    return write_pages(out, page, found.results, command=command)
 
 
 @dataclass(frozen=True, kw_only=True)
