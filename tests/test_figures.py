@@ -11,9 +11,9 @@ from toy_policies import write_toy
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.report import style
 from socialnav_mj.studies.levels import LEVEL_MEASURES, LevelTable, levels
-from socialnav_mj.studies.looks import LOOKS
+from socialnav_mj.studies.looks import LOOKS, SHADES
 from socialnav_mj.studies.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
-from socialnav_mj.studies.paper import figures
+from socialnav_mj.studies.paper import figures, training_curves
 from socialnav_mj.studies.paper.figures import FIGURES, draw_figures, draw_sweep
 from socialnav_mj.studies.paper.reward_map import MOTIONS, REACH, draw_reward_maps, reward_map
 from socialnav_mj.studies.paper.training_curves import draw_training_curves, training_table
@@ -90,7 +90,7 @@ def test_five_figures_appear_as_png_and_svg_with_their_labels(drawn):
             assert all(line in text for line in row.label.split("\n"))
         if drawing.bars:
             assert all(f"({'abcd'[k]}) scenario {k + 1}" in text for k in range(4))
-            assert "each training" in text
+            assert "each training" in text and "human, 95 % interval" in text
     assert "1.2 m" in texts(folder / "figure_4_intrusions.svg")
 
 
@@ -141,6 +141,20 @@ def test_sweep_runs_from_the_potential_field_to_the_learned_policy(table, tmp_pa
     text = texts(paths[1])
     for label in ("switch distance [m]", "PF", "IRL", "scenario 4: 90 % agents", "share of agents that succeed"):
         assert label in text
+    assert "the paper's 2 m" in text
+
+
+def test_sweep_has_a_tick_at_every_distance(table, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, folder, name: drawn.append(figure) or [])
+    draw_sweep({0.5: table, 1.0: table, 1.5: table, 2.0: table}, table, tmp_path)
+    for axes in drawn[0].axes:
+        assert [label.get_text() for label in axes.get_xticklabels()] == ["PF", "0.5", "1", "1.5", "2", "IRL"]
+
+
+def test_scenarios_and_trainings_have_no_methods_colour():
+    assert not {*SHADES} & {look.colour for look in LOOKS.values()}
+    assert min(np.diff([grey(colour) for colour in SHADES])) > 0.1
 
 
 @pytest.fixture
@@ -185,6 +199,8 @@ def test_reward_maps_are_drawn_with_titles_and_scale(shy, tmp_path):
     text = texts(paths[1])
     for label in ("walker approaching", "walker crossing", "walker receding", "training 1", "learned reward", "alone"):
         assert label in text
+    for words in ("Learned reward of an agent at 0.8 m/s", "with nobody there", "dashed circle: 1.2 m"):
+        assert words in text
     assert paths[1].stat().st_size < 1_000_000 and REACH == 3.0
 
 
@@ -213,3 +229,13 @@ def test_training_curves_mark_the_kept_checkpoint_and_the_table_says_where_the_t
     lines = training_table({**cards, 4: {"config": {}}})
     assert "| 3 | 3000 | 7 | - | - | 0.750 / 0.125 | 50% / 10% / 40% of 1.0 min |" in lines
     assert "| 4 | - | - | - | - | - | - |" in lines
+
+
+def test_training_curves_clip_no_point(tmp_path, monkeypatch):
+    """Success rises from the lower to the upper end: rings and points there are drawn whole."""
+    drawn = []
+    monkeypatch.setattr(training_curves, "save", lambda figure, folder, name: drawn.append(figure) or [])
+    draw_training_curves({0: history_card(3000)}, tmp_path)
+    for axes in drawn[0].axes:
+        assert all(not line.get_clip_on() for line in axes.lines)
+        assert axes.get_ylim()[1] > axes.dataLim.y1 and axes.get_xlim()[1] > axes.dataLim.x1

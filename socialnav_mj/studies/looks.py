@@ -28,8 +28,8 @@ LOOKS: dict[str, Look] = {
     MIXED: Look(label="hybrid", colour="#BB5566", hatch="....", marker="D", line="-."),
     HUMAN: Look(label="human", colour="#000000", hatch="", marker="^", line=":"),
 }
-SHADES = ("#000000", "#004488", "#BB5566", "#DDAA33")
-"""Dark to light, for whatever is no method; with MARKERS and LINES beside them."""
+SHADES = ("#40004B", "#762A83", "#A477B7", "#CDB2D8")
+"""Dark to light purple, for whatever is no method, and no method's colour; with MARKERS and LINES beside them."""
 MARKERS = ("o", "s", "D", "^")
 LINES = ("-", "--", "-.", ":")
 

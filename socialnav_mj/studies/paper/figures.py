@@ -25,6 +25,10 @@ DOT: dict[str, Any] = {
     "markeredgecolor": "black",
 }
 """One training alone."""
+BAND: dict[str, Any] = {"color": "#000000", "alpha": 0.12, "linewidth": 0.0}
+"""The recorded people's interval."""
+PAPER_DISTANCE = 2.0
+"""Where the paper's mixed policy switches [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,11 +136,21 @@ def draw_sweep(sweep: Mapping[float, LevelTable], table: LevelTable, folder: Pat
                 points = [(x + shift, level) for x, level in found if level is not None]
                 look = {"color": SHADES[k % 4], "marker": MARKERS[k % 4], "linestyle": LINES[k % 4]}
                 _error_bars(axes, points, label=SCENARIO_TITLES.get(scenario, scenario), **look)
-            axes.axvline(2.0, color="#999999", linewidth=0.8)
+            axes.axvline(PAPER_DISTANCE, color="#666666", linewidth=0.8)
+            axes.annotate(
+                f"the paper's {PAPER_DISTANCE:g} m",
+                (PAPER_DISTANCE, 1.0),
+                (0, 2),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=7.0,
+                color="#444444",
+            )
             axes.set_ylabel(row.label)
             axes.set_xlabel("switch distance [m]")
-            middle = [d for d in distances if float(d).is_integer()]
-            axes.set_xticks([0.0, *middle, end], ["PF", *(f"{d:g}" for d in middle), "IRL"])
+            axes.set_xticks([0.0, *distances, end], ["PF", *(f"{d:g}" for d in distances), "IRL"], fontsize=6.5)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2)
         return save(figure, folder, "figure_6_switch_distance")
@@ -192,7 +206,7 @@ def _human_band(axes: Axes, level: Level | None) -> None:
     axes.axhline(level.interval.mean, color="white", linewidth=2.4, zorder=4.5)
     axes.axhline(level.interval.mean, color=look.colour, linestyle=look.line, linewidth=1.2, zorder=5)
     if np.isfinite(level.interval.low):
-        axes.axhspan(level.interval.low, level.interval.high, color="#000000", alpha=0.12, linewidth=0.0, zorder=0.5)
+        axes.axhspan(level.interval.low, level.interval.high, zorder=0.5, **BAND)
 
 
 def _lines(table: LevelTable, drawing: Drawing) -> Figure:
@@ -252,5 +266,6 @@ def _legend(figure: Figure, *, bars: bool) -> None:
     if bars:
         dot = Line2D([], [], **DOT)
         dot.set_label("each training")
-        handles.append(dot)
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+        handles += [dot, Patch(label="human, 95 % interval", **BAND)]
+    columns = len(handles) if len(handles) <= 6 else (len(handles) + 1) // 2
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)

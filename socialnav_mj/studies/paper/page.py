@@ -103,11 +103,23 @@ def experiment_page(
     if all("history" in card for card in cards.values()):
         weight = next(iter(cards.values()))["config"]["intrusion_weight"]
         lines += [_TRAINING.format(weight=weight), *training_table(cards), ""]
-        lines += ["![training](figures/figure_9_training.png)", ""]
+        lines += ["![Success, intrusions and collisions over each training](figures/figure_9_training.png)", ""]
     lines += ["## In-sample and held out", "", _HELD_OUT, *_periods(held_out)]
     if len(sweep) > 1:
-        lines += ["## Switch distance", "", *_swept(sweep), "![sweep](figures/figure_6_switch_distance.png)", ""]
-    lines += ["## What the reward learned", "", _REWARD, "![reward](figures/figure_7_learned_reward.png)", ""]
+        lines += [
+            "## Switch distance",
+            "",
+            *_swept(sweep),
+            "![The hybrid over its switch distance](figures/figure_6_switch_distance.png)",
+            "",
+        ]
+    lines += [
+        "## What the reward learned",
+        "",
+        _REWARD,
+        "![Learned reward by the place of one walker](figures/figure_7_learned_reward.png)",
+        "",
+    ]
     return "\n".join([*lines, *traceability(provenance, [recording])]) + "\n"
 
 

@@ -104,7 +104,13 @@ def draw_reward_maps(policies: Mapping[str, TrainedPolicy], folder: Path) -> lis
     """
     maps = {title: [reward_map(policy, motion) for motion in MOTIONS] for title, policy in policies.items()}
     with style():
-        figure = new_figure(0.55 + 1.95 * len(maps))
+        figure = new_figure(1.05 + 1.95 * len(maps))
+        figure.suptitle(
+            f"Learned reward of an agent at {AGENT_SPEED:g} m/s with its goal {GOAL_DISTANCE:g} m ahead, by where "
+            f"one walker is ({WALKER_SPEED:g} m/s along the arrows)\n"
+            f"white line: the same reward as with nobody there; dashed circle: {INTIMATE_DISTANCE:g} m",
+            fontsize=8.0,
+        )
         grid = figure.subplots(len(maps), len(MOTIONS), sharex=True, sharey=True, squeeze=False)
         for axes, motion in zip(grid[0], MOTIONS, strict=True):
             axes.set_title(f"walker {motion}")

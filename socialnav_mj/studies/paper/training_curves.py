@@ -33,13 +33,15 @@ def draw_training_curves(cards: Mapping[int, Mapping[str, Any]], folder: Path) -
                 steps = [entry["scene_steps"] / 1000.0 for entry in card["history"]]
                 values = [entry[key] for entry in card["history"]]
                 look = {"color": SHADES[k % 4], "marker": MARKERS[k % 4], "linestyle": LINES[k % 4]}
-                axes.plot(steps, values, label=f"training {seed}", markersize=3.0, **look)
+                axes.plot(steps, values, label=f"training {seed}", markersize=3.0, clip_on=False, **look)
                 kept = [(x, y) for x, y in zip(steps, values, strict=True) if x == card["scene_steps"] / 1000.0]
                 for x, y in kept:
-                    axes.plot(x, y, marker="o", markersize=9.0, fillstyle="none", color=SHADES[k % 4])
+                    axes.plot(x, y, marker="o", markersize=9.0, fillstyle="none", color=SHADES[k % 4], clip_on=False)
             axes.set_xlabel("thousand scene steps")
             axes.set_ylabel(label)
-            axes.set_ylim(bottom=0.0)
+            # Room for the rings; what lies on an axis is drawn whole.
+            axes.margins(x=0.07)
+            axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=4)
         return save(figure, folder, "figure_9_training")
