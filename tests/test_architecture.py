@@ -40,7 +40,7 @@ ROWS = (
     {"controllers"},
     {"recorder", "rollout", "human", "resumption", "evaluation"},
     {"metrics"},
-    {"trace"},
+    {"trace", "film"},
     {"report"},
     {"envs"},
     {"learning"},
@@ -70,6 +70,7 @@ ONLY_IN = {
         "environment",
         "suite",
         "benchmark",
+        "film",
     },
     "dm_control": {
         "scene",

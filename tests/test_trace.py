@@ -16,6 +16,7 @@ from rerun.chunk import RrdReader
 from socialnav_mj.episode import Episode, Outcome, Partner
 from socialnav_mj.trace.events import events, severities, touch_rows
 from socialnav_mj.trace.lanes import policy_changes, state_changes
+from socialnav_mj.trace.layout import minute_of
 from socialnav_mj.trace.writer import chosen_agents, write_trace
 
 Rows = dict[int, Any]
@@ -397,3 +398,17 @@ def test_clamped_forces_are_not_shown_as_fact(tmp_path: Path) -> None:
         [value[0] for _, value in sorted(columns[f"Touch:{name}"].items())] for name in ("impact_force", "push_impulse")
     ]
     np.testing.assert_array_equal(shown, [[np.nan, np.nan, 70.0], [9.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("windows", "expected"),
+    [
+        ([], (0.0, 200.0)),
+        ([(100.0, 120.0), (10.0, 20.0)], (80.0, 140.0)),
+        ([(5.0, 15.0)], (0.0, 40.0)),
+        ([(50.0, 150.0)], (50.0, 150.0)),
+    ],
+)
+def test_plots_of_the_chosen_open_on_the_minute_of_the_first(windows, expected):
+    found = minute_of(np.array(windows).reshape(-1, 2), np.array([0.0, 200.0]))
+    assert tuple(found) == expected

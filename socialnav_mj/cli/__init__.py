@@ -16,11 +16,14 @@ from socialnav_mj.cli.cost import Bench, StepSize
 from socialnav_mj.cli.learning import Ship, Train
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
 from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce
+from socialnav_mj.cli.view import Render, View
 from socialnav_mj.processes import stoppable
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[View, tyro.conf.subcommand("view")]
+    | Annotated[Render, tyro.conf.subcommand("render")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
     | Annotated[Draws, tyro.conf.subcommand("draws")]
     | Annotated[List, tyro.conf.subcommand("list")]

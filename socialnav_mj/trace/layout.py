@@ -146,6 +146,7 @@ def layout(
     high: Array,
     times: Array,
     *,
+    minute: Array,
     max_speed: float,
     several_policies: bool,
     scores: NDArray[np.float32] | None,
@@ -156,6 +157,7 @@ def layout(
         low: (2,) smallest x and y of the scene [m].
         high: (2,) largest [m].
         times: (2,) first and last sample [s].
+        minute: (2,) what the plots of the chosen robots open on, see `minute_of` [s].
         max_speed: What the robots' wheels can do [m/s].
         several_policies: Whether to show lanes of the policy in use.
         scores: What is shown of policies' costs, of any shape; None if nothing is.
@@ -167,25 +169,19 @@ def layout(
     span = float(max(high - low))
     oblique = rrb.EyeControls3D(position=(x, y - 0.7 * span, 0.55 * span), look_target=(x, y - 0.08 * span, 0.0))
     above = rrb.EyeControls3D(position=(x, y - 1e-3, 0.93 * span), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
-    # All of the episode, and room for the legend to its right.
-    axis = rrb.TimeAxis(
-        view_range=rr.TimeRange(
-            start=rr.TimeRangeBoundary.absolute(seconds=float(times[0])),
-            end=rr.TimeRangeBoundary.absolute(seconds=float(times[1] + 0.25 * (times[1] - times[0]))),
-        )
-    )
-    chosen = [rrb.StateTimelineView(name="State: chosen robots", origin="/chosen/state", time_view=axis)]
+    axis, own = _axis(times), _axis(minute)
+    chosen = [rrb.StateTimelineView(name="State: chosen robots", origin="/chosen/state", time_view=own)]
     every = [rrb.StateTimelineView(name="State: all robots", origin="/lanes/state", time_view=axis)]
     if several_policies:
-        chosen.append(rrb.StateTimelineView(name="Policy: chosen robots", origin="/chosen/policy", time_view=axis))
+        chosen.append(rrb.StateTimelineView(name="Policy: chosen robots", origin="/chosen/policy", time_view=own))
         every.append(rrb.StateTimelineView(name="Policy: all robots", origin="/lanes/policy", time_view=axis))
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(_spatial("Crowd", oblique), _spatial("From above", above), row_shares=[1.0, 1.15]),
             rrb.Vertical(
-                rrb.Tabs(*_series("speed", "Speed [m/s]", (0.0, 1.25 * max_speed), axis)),
-                rrb.Tabs(*_series("nearest_human", "Nearest pedestrian [m]", (0.0, 4.0), axis)),
-                *_scores(scores, axis),
+                rrb.Tabs(*_series("speed", "Speed [m/s]", (0.0, 1.25 * max_speed), own)),
+                rrb.Tabs(*_series("nearest_human", "Nearest pedestrian [m]", (0.0, 4.0), own)),
+                *_scores(scores, own),
                 *(rrb.Tabs(*pair) for pair in zip(every, chosen, strict=True)),
             ),
             rrb.Vertical(
@@ -202,6 +198,33 @@ def layout(
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="paused"),
+    )
+
+
+def minute_of(windows: Array, times: Array) -> Array:
+    """The time that shows the first of the chosen robots, and who else drives then.
+
+    Args:
+        windows: (k, 2) begin and end of the trip of each chosen robot, the most interesting one first [s].
+        times: (2,) first and last sample of the episode [s].
+
+    Returns:
+        (2,) begin and end: a minute about the first robot's trip, or all of the trip if it is longer, as far as the
+        episode goes; all of the episode if nobody is chosen [s].
+    """
+    if not len(windows):
+        return times
+    begin, end = windows[0]
+    margin = max(0.0, 0.5 * (60.0 - (end - begin)))
+    return np.array([max(times[0], begin - margin), min(times[1], end + margin)])
+
+
+def _axis(times: Array) -> rrb.TimeAxis:
+    """With room for the legend to the right."""
+    boundary = rr.TimeRangeBoundary
+    end = float(times[1] + 0.25 * (times[1] - times[0]))
+    return rrb.TimeAxis(
+        view_range=rr.TimeRange(start=boundary.absolute(seconds=float(times[0])), end=boundary.absolute(seconds=end))
     )
 
 
@@ -236,7 +259,7 @@ def _scores(scores: NDArray[np.float32] | None, axis: rrb.TimeAxis) -> list[rrb.
 
 
 def _series(quantity: str, title: str, span: tuple[float, float], axis: rrb.TimeAxis) -> list[rrb.TimeSeriesView]:
-    """The chosen robots over the whole episode; all robots, too many for that, around the time cursor."""
+    """The chosen robots over their minute; all robots, too many for that, around the time cursor."""
     height = rrb.ScalarAxis(range=span)
     limits = f"/limits/{quantity}/**"
     boundary = rr.TimeRangeBoundary

@@ -83,10 +83,12 @@ def _write(episode: Episode, path: Path) -> None:
     metadata = episode.metadata
     name = f"{metadata['scenario_name']} {metadata['controller']} draw {metadata['draw']}"
     low, high = bounds(episode)
+    windows = np.array([episode.time[episode.window(agent)][[0, -1]] for agent in chosen]).reshape(-1, 2)
     layout = look.layout(
         low,
         high,
         episode.time[[0, -1]],
+        minute=look.minute_of(windows, episode.time[[0, -1]]),
         max_speed=metadata["scenario"]["robot"]["max_speed"],
         several_policies=len(episode.policies) > 1,
         scores=episode.agent_scores,
