@@ -31,14 +31,14 @@ help:
 	@echo "make kill     kill commands at random moments and repeat them, ROUNDS=$(ROUNDS) times"
 	@echo "make lint     format check, lint, types"
 	@echo "make format   format and mend what can be mended"
-	@echo "make docs     bring the tables of docs/ up to date"
+	@echo "make docs     bring the tables of docs/ up to date, and build the site; any error ends it"
 	@echo "make clean    remove the environment and the caches, not the results"
 	@echo "Choose a Python with PYTHON=python3.12; it has to be 3.11 or 3.12."
 
 # One draw: three would take more than the two minutes that a demo may take on two cores.
 demo: $(PLAIN)
 	$(BIN)/socialnav-mj evaluate --dataset plaza --scenarios 1 2 3 4 --draws 1 --out $(OUT)
-	@echo "Tables: $(OUT)/report.md and summary.csv. Traces: 'rerun $(OUT)/traces/*.rrd' ($(BIN)/rerun)."
+	@echo "Report: $(OUT)/report.html. Traces: '$(BIN)/socialnav-mj view $(OUT)', with --web in a browser."
 
 test: lint
 	$(BIN)/python -m pytest
@@ -61,11 +61,13 @@ format: $(ALL)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: $(PLAIN)
+docs: $(ALL)
 	$(BIN)/python -c 'from socialnav_mj.report.definitions import write_definitions; write_definitions("docs/metrics.md")'
+	$(BIN)/python -m mkdocs build --strict --quiet
+	@echo "Site: site/index.html"
 
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist site .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 python-version:
 	@case "$(VERSION)" in \
