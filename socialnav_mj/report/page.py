@@ -114,7 +114,8 @@ def report_blocks(
         ]
         blocks += ["\n".join(lines), table]
         lines = [""]
-    lines += [*sections, "## How to read it", "", cells + _HOW_TO_READ.replace("{people}", _people(summary)), *_traceability(summary)]
+    how = cells + _HOW_TO_READ.replace("{people}", _people(summary))
+    lines += [*sections, "## How to read it", "", how, *_traceability(summary)]
     return [*blocks, "\n".join(lines) + "\n"]
 
 
