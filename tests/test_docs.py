@@ -140,8 +140,9 @@ def test_options_in_the_text_are_those_of_a_command(capsys):
     named = {span.split()[0]: name for page, name in zip(PAGES, NAMES, strict=True) for span in code_spans(page)}
     named = {option: page for option, page in named.items() if re.fullmatch(r"--[a-z-]+", option)}
     known = {"--help"}
-    single = ("evaluate", "report", "verify", "draws", "bench", "ship", "reproduce", "view", "render")
-    for words in [[name] for name in single] + [
+    for words in [
+        [name] for name in ("evaluate", "report", "verify", "draws", "bench", "ship", "reproduce", "view", "render")
+    ] + [
         ["leave-one-out"],
         ["step-size"],
         ["gains"],

@@ -126,6 +126,9 @@ def test_figures_are_put_in_and_none_from_outside_the_folder(tmp_path):
         ("1,234", 1234.0, None, False),
         ("0.1 / 0.2", 0.1, None, False),
         ("12.5 ± 0.3", 12.5, None, False),
+        ("1-3", 1.0, None, True),
+        ("2-3", 2.0, None, False),
+        ("1", 1.0, None, False),
     ],
 )
 def test_cells_of_markdown_tables_are_read(text, value, interval, tied):

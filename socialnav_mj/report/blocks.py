@@ -9,6 +9,7 @@ from functools import cached_property
 
 _NUMBER = r"[-+]?\d[\d,]*(?:\.\d+)?"
 _WITH_INTERVAL = re.compile(rf"({_NUMBER}) \(({_NUMBER}) to ({_NUMBER})\)")
+_TIED_RANKS = re.compile(r"1-\d+")
 _FIRST = re.compile(rf"{_NUMBER}(?![\w.])")
 _MARGIN = 4.0
 """Of a drawn interval's picture, which is 100 wide."""
@@ -139,7 +140,8 @@ def digest_of(state_hashes: Sequence[str]) -> str:
 def cell_of(text: str, shown: str | None = None) -> Cell:
     """A cell that stands in a Markdown table, with what its text says of a mean and its interval.
 
-    A difference is written with its sign; it is a tie where its interval covers 0.
+    A difference is written with its sign; it is a tie where its interval covers 0. A set of ranks, as "1-3", is a tie
+    for the first one.
 
     Args:
         text: Without Markdown's marks, as `markdown.number` and `markdown.interval` write numbers.
@@ -154,7 +156,7 @@ def cell_of(text: str, shown: str | None = None) -> Cell:
         tied = "+" in found[0] and low <= 0.0 <= high
         return Cell(shown=shown, value=value, low=low, high=high, reads=f"{found[2]} to {found[3]}", tied=tied)
     if found := _FIRST.match(text):
-        return Cell(shown=shown, value=_value(found[0]))
+        return Cell(shown=shown, value=_value(found[0]), tied=bool(_TIED_RANKS.fullmatch(text)))
     return Cell(shown=shown, is_text=text != "-")
 
 

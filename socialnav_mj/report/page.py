@@ -114,8 +114,13 @@ def report_blocks(
         ]
         blocks += ["\n".join(lines), table]
         lines = [""]
-    how = cells + _HOW_TO_READ.replace("{people}", _people(summary))
-    lines += [*sections, "## How to read it", "", how, *_traceability(summary)]
+    lines += [
+        *sections,
+        "## How to read it",
+        "",
+        cells + _HOW_TO_READ.replace("{people}", _people(summary)),
+        *_traceability(summary),
+    ]
     return [*blocks, "\n".join(lines) + "\n"]
 
 

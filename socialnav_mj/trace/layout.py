@@ -38,10 +38,10 @@ STATES: dict[str, Colour] = {
 }
 """State of a robot -> colour."""
 
-CHOSEN: tuple[Colour, ...] = (YELLOW, PINK, GREEN, (160, 140, 255), WHITE)
-"""One colour for each robot that is followed closely."""
+CHOSEN: tuple[Colour, ...] = (YELLOW, PINK, GREEN, (160, 140, 255), (230, 159, 0))
+"""One colour for each robot that is followed closely; seen on a light viewer too."""
 
-CHOSEN_NAMES = ("yellow", "pink", "green", "violet", "white")
+CHOSEN_NAMES = ("yellow", "pink", "green", "violet", "orange")
 """Names of these colours."""
 
 KEY = """
