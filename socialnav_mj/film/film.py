@@ -169,6 +169,7 @@ def write_film(episode: Episode, shot: Shot, path: Path) -> Iterator[int]:
             if path.suffix == ".gif"
             else {"fps": shot.rate, "codec": "libx264", "quality": 7, "macro_block_size": 2}
         )
+        writer: Any  # imageio types its plugins' writers by a base class that cannot write
         with imageio.get_writer(part, **settings) as writer:
             for count, frame in enumerate(drawn, start=1):
                 writer.append_data(frame)
