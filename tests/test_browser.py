@@ -13,7 +13,6 @@ from episodes import Agent, Pedestrian, Touch, build_episode, line
 from PIL import Image
 from test_html import episode
 
-from socialnav_mj.cli.view import traces_of
 from socialnav_mj.report.writer import write_report
 from socialnav_mj.trace.layout import SKY
 from socialnav_mj.trace.start import HOST
@@ -119,8 +118,7 @@ def viewer(tmp_path_factory):
         [Pedestrian(positions=line((3, 1), (3, -2), 50))],
         [Touch(agent=0, partner=0, step=12.0)],
     )
-    write_trace(made, folder / "traces" / "one.rrd")
-    with web_viewer(traces_of(folder / "traces" / "one.rrd", folder), 0) as address:
+    with web_viewer([write_trace(made, folder / "one.rrd")], 0) as address:
         yield address
 
 
@@ -133,8 +131,9 @@ def test_web_viewer_draws_a_trace_without_the_network(browser, viewer):  # noqa:
     hosts: set[str] = set()
     # What the page's policy stops is no request that went out.
     opened.on("response", lambda response: hosts.add(urlsplit(response.url).hostname or ""))
+    opened.set_default_timeout(1000 * PATIENCE)
     opened.goto(viewer)
-    opened.wait_for_selector("canvas", timeout=1000 * PATIENCE)
+    opened.wait_for_selector("canvas")
     deadline = time.monotonic() + PATIENCE
     while not is_drawn(pixels := np.asarray(Image.open(io.BytesIO(opened.screenshot())).convert("RGB"))):
         assert time.monotonic() < deadline, f"{len(np.unique(pixels.reshape(-1, 3), axis=0))} colours"
