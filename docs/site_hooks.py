@@ -4,11 +4,19 @@ import re
 from pathlib import Path
 from typing import Any
 
+from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "data/plaza/README.md", "results/**/*.md", "results/**/*.png")
 _LINK = re.compile(r"(\]\(|src=\")(\.\./|docs/)")
+
+
+@event_priority(-100)
+def on_config(config: Any) -> Any:
+    """Nothing is fetched from elsewhere: without the theme's shim the search alone needs a server."""
+    config.extra["polyfills"] = [url for url in config.extra.get("polyfills", []) if not url.startswith("http")]
+    return config
 
 
 def on_files(files: Files, *, config: Any) -> Files:
