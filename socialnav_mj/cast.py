@@ -7,6 +7,7 @@ import numpy as np
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array, quaternion_of_yaw
+from socialnav_mj.reaction import Movers
 from socialnav_mj.recordings import Recording
 from socialnav_mj.recordings.draw import replaced_people
 from socialnav_mj.slots import share_slots
@@ -167,7 +168,7 @@ class Replay:
             cast: Of this recording and scenario; says who is replayed, in which slot, from when to when.
         """
         self._count = count = scenario.n_sub_steps
-        self._timestep, self._yield = scenario.physics_timestep, scenario.pedestrian == "compliant"
+        self._timestep, self._yield = scenario.physics_timestep, scenario.pedestrian_body == "compliant"
         slots = cast.n_pedestrian_slots
         self._steps = steps = int(cast.pedestrian_last_step.max(initial=-1)) + 1
         # One row more than there are control steps: an empty scene, for all the time after.
@@ -207,6 +208,18 @@ class Replay:
             present=self._present[row],
             changed=self._changed[row] if step == row else self._changed[row][:0],
         )
+
+    def begin(self) -> None:
+        """Nothing: a replay is the same every time."""
+
+    def react(self, step: int, people: SlotCrowd, robots: Movers) -> None:
+        """Nothing: people of a recording do not see robots.
+
+        Args:
+            step: Not used.
+            people: Not used.
+            robots: Not used.
+        """
 
     def motion(self, step: int) -> tuple[Array, Array, Array | None]:
         """Positions and velocities at the beginning of every physics step of a control step.

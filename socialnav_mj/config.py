@@ -8,13 +8,17 @@ from typing import Any, Literal, get_args
 
 TurnLimit = Literal["per_step", "per_second"]
 OnCollision = Literal["continue", "retire"]
-Pedestrian = Literal["rigid", "compliant"]
+Pedestrians = Literal["replay", "weak", "yielding"]
+Plant = Literal["wheels", "unicycle"]
+PedestrianBody = Literal["rigid", "compliant"]
 
 ROBOT_RADII = (0.1, 0.4)
 """Least and largest radius of a robot's bumper. A sphere whose centre is 0.10 m high has to reach down to the floor;
 a wide one tips on wheels that stand 0.12 m beside the middle: docs/metrics.md, "What the physics bears" [m]."""
 PEDESTRIAN_RADII = (0.05, 0.4)
 """Least and largest radius of a person's body: thinner than a leg, or so wide that robots are thrown, as above [m]."""
+FLOOR_FRICTIONS = (0.05, 1.5)
+"""Least and largest friction of wheels on the floor: wet ice, and more than rubber has on any floor."""
 MIN_CONTACT_DISTANCE = 0.25
 """Least sum of a robot's and a person's radius. A person at u sinks 0.105 s u + 0.02 m into a robot that stands, and is
 through when that is the sum: at 2.2 m/s, faster than 99.6 % of recorded steps; at 0.15 m already at 1.3 m/s [m]."""
@@ -76,8 +80,16 @@ class Scenario:
     """Body of every agent."""
     pedestrian_radius: float = 0.15
     """Radius of a replayed person's body [m]."""
-    pedestrian: Pedestrian = "rigid"
-    """A replayed person's body: where the recording has it, whatever it meets; or of 75 kg, with a limited force."""
+    pedestrian_body: PedestrianBody = "rigid"
+    """What a person's body is when it is touched: moved on whatever it meets, or 75 kg that push with a limited
+    force."""
+    pedestrians: Pedestrians = "replay"
+    """What people do before they are touched: keep to the recorded track, or step off it for robots and come back,
+    weakly or as walkers do for each other."""
+    plant: Plant = "wheels"
+    """What turns commands into motion: wheels with motors, mass and grip, or an ideal unicycle that follows exactly."""
+    floor_friction: float | None = None
+    """Friction of the wheels on the floor; None for what the robot's file says, 0.8 by default."""
     turn_limit: TurnLimit = "per_step"
     """Reading of the paper's [-pi/6, pi/6]: a turn per control step, or a yaw rate in rad/s."""
     on_collision: OnCollision = "continue"
@@ -109,13 +121,17 @@ class Scenario:
         )
         object.__setattr__(self, "seed", int(self.seed))  # numpy's integers are no JSON values
         for name, choices in (
-            ("pedestrian", get_args(Pedestrian)),
+            ("pedestrian_body", get_args(PedestrianBody)),
+            ("pedestrians", get_args(Pedestrians)),
+            ("plant", get_args(Plant)),
             ("turn_limit", get_args(TurnLimit)),
             ("on_collision", get_args(OnCollision)),
         ):
             _require(getattr(self, name) in choices, name, getattr(self, name), ", ".join(choices))
         for name in ("control_timestep", "goal_radius"):
             _require_number(getattr(self, name), name, "numbers > 0", lambda value: value > 0.0)
+        if self.floor_friction is not None:
+            _require_within(self.floor_friction, "floor_friction", *FLOOR_FRICTIONS)
         _require_within(self.pedestrian_radius, "pedestrian_radius", *PEDESTRIAN_RADII)
         _require(
             self.contact_distance >= MIN_CONTACT_DISTANCE - 1e-9,
@@ -209,9 +225,14 @@ class Scenario:
         """The resolved configuration as plain JSON values.
 
         Returns:
-            A nested dictionary that `from_dict` reads back.
+            A nested dictionary that `from_dict` reads back. Settings that came later are left out at their defaults, so
+            that episodes of before say the same.
         """
-        return asdict(self)
+        values = asdict(self)
+        for name in _LATER:
+            if values[name] == getattr(Scenario, name):
+                del values[name]
+        return {_IN_FILES.get(name, name): value for name, value in values.items()}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "Scenario":
@@ -223,9 +244,14 @@ class Scenario:
         Returns:
             The scenario.
         """
-        return cls(**{**values, "robot": Robot(**values["robot"])})
+        names = {stored: name for name, stored in _IN_FILES.items()}
+        own = {names.get(name, name): value for name, value in values.items()}
+        return cls(**{**own, "robot": Robot(**own["robot"])})
 
 
+_IN_FILES = {"pedestrian_body": "pedestrian"}
+"""Settings that have another name in files."""
+_LATER = ("pedestrians", "plant", "floor_friction")
 _ROBOT = "robot_"
 SETTINGS = (
     *(setting.name for setting in fields(Scenario) if setting.name != "robot"),

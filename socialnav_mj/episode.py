@@ -25,7 +25,7 @@ IntArray = NDArray[np.int64]
 FORMAT = "socialnav_mj.episode/4"
 MAX_BYTES = 1 << 30
 """An episode file whose arrays are larger is not read: a small file can ask for any amount of memory."""
-_OPTIONAL = {"agent_scores"}
+_OPTIONAL = {"agent_scores", "pedestrian_deviation"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,6 +126,8 @@ class Episode:
     """Names that `agent_policy` indexes; the controller's name alone if it never switches."""
     agent_scores: NDArray[np.float32] | None = None
     """(t, n, policies) what each would have cost, if the controller tells; NaN where `agent_policy` is -1."""
+    pedestrian_deviation: Array | None = None
+    """(t, m, 2) from the recorded place, of people who react or can be held back; None: all keep to it [m]."""
     metadata: dict[str, Any]
     """JSON values: controller, its configuration, scenario, recording with its checksum, versions, state_hash."""
 
@@ -197,7 +199,6 @@ class Episode:
             The episode, equal to the one saved.
 
         Raises:
-            FileNotFoundError: If there is no such file.
             EpisodeError: If the file is damaged or not an episode of this format.
         """
         expected = {f.name for f in fields(cls)} - {"policies", "metadata"} - _OPTIONAL

@@ -34,6 +34,7 @@ _PER_STEP = {
     "agent_policy",
     "agent_scores",
     "pedestrian_position",
+    "pedestrian_deviation",
     "pedestrian_heading",
     "pedestrian_velocity",
 }
@@ -43,6 +44,7 @@ _PLANAR = {
     "agent_position",
     "agent_velocity",
     "agent_wheel_speed",
+    "pedestrian_deviation",
     "pedestrian_position",
     "pedestrian_velocity",
     *(f"contact_{name}" for name in PLANAR_COLUMNS),
@@ -159,7 +161,8 @@ def _check_presence(episode: "Episode") -> None:
     if not np.array_equal(lies, at_end & (episode.agent_outcome == Outcome.OVERTURNED)):
         raise EpisodeError("agent_tilt must exceed the limit at the end of overturned agents, and nowhere else")
     there = np.isfinite(episode.pedestrian_heading)
-    for name in ("pedestrian_position", "pedestrian_velocity"):
+    deviation = ("pedestrian_deviation",) if episode.pedestrian_deviation is not None else ()
+    for name in ("pedestrian_position", "pedestrian_velocity", *deviation):
         if not _is_finite_where(getattr(episode, name), there):
             raise EpisodeError(f"{name} must be finite where pedestrian_heading is, and NaN elsewhere")
 

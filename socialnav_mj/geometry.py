@@ -94,3 +94,23 @@ def twist_of_wheel_speed(wheel_speed: ArrayLike, *, wheel_radius: float, track: 
     wheel_speed = np.asarray(wheel_speed, dtype=float)
     left, right = wheel_radius * wheel_speed[..., 0], wheel_radius * wheel_speed[..., 1]
     return np.stack([0.5 * (left + right), (right - left) / track], axis=-1)
+
+
+def arc(position: Array, heading: Array, twist: Array, time: Array) -> tuple[Array, Array]:
+    """Where unicycles are that drive at constant twists.
+
+    Args:
+        position: At the beginning, shape (n, 2) [m].
+        heading: At the beginning, shape (n,) [rad].
+        twist: Forward speed and yaw rate, shape (n, 2) [m/s], [rad/s].
+        time: Since then, shape (k, 1) [s].
+
+    Returns:
+        Positions, shape (k, n, 2), and headings, shape (k, n), the latter not wrapped.
+    """
+    half = 0.5 * time * twist[:, 1]
+    # The chord of an arc is its length times sin(half) / half, in the direction of its middle.
+    chord = time * twist[:, 0] * np.where(np.abs(half) > 1e-6, sin(half) / np.where(half == 0.0, 1.0, half), 1.0)
+    middle = heading + half
+    way = np.stack([chord * cos(middle), chord * sin(middle)], axis=-1)
+    return position + way, heading + 2.0 * half

@@ -1,4 +1,4 @@
-"""Bodies of the replayed people: mocap bodies that nothing stops, or bodies of 75 kg that push with a limited force."""
+"""Bodies of the people, once they are touched: mocap bodies that nothing stops, or 75 kg with a limited force."""
 
 from typing import Protocol
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array
 from socialnav_mj.people import people_of
+from socialnav_mj.plant import unicycles_of
 from socialnav_mj.robots import RobotPool
 from socialnav_mj.scene_index import first_invalid
 from socialnav_mj.touch import Touch
@@ -47,6 +48,7 @@ class Physics(RobotPool):
         super()._reload_from_data(data)
         model = data.model.ptr
         self._people = people_of(self._index, model, data.ptr)
+        self._unicycles = unicycles_of(self._index, model, data.ptr)
         self._velocity_before = np.zeros(model.nv)
         self._path: tuple[Array | None, Array | None, Array | None] = (None, None, None)
 
@@ -145,10 +147,12 @@ class Physics(RobotPool):
         """
         model, data = self.model.ptr, self.data.ptr
         qvel, before, contact = data.qvel, self._velocity_before, data.contact
-        people, (path, velocity, walk) = self._people, self._path
+        people, unicycles, (path, velocity, walk) = self._people, self._unicycles, self._path
         if path is not None and len(path) != nstep:
             raise ValueError(f"the pedestrians' path has {len(path)} positions for {nstep} physics steps")
         people.follow(path, velocity, walk, nstep)
+        if unicycles is not None:
+            unicycles.follow(nstep)
         time, kinds_of_warning = data.time, np.count_nonzero(self._warnings)
         try:
             with self.check_invalid_state():
@@ -160,6 +164,8 @@ class Physics(RobotPool):
                     # The floor is geom 0, and MuJoCo names it first: all else is a touch of two bodies.
                     if np.count_nonzero(contact.geom1):
                         self._touches.note(model, data, time=time, velocity_before=before, people=people, step=k)
+                    if unicycles is not None:
+                        unicycles.settle(k)
                     # One step later an invalid number has spread to all robots and nobody can tell whose it was.
                     if np.count_nonzero(self._warnings) != kinds_of_warning:
                         break

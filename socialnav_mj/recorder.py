@@ -42,7 +42,8 @@ class Recorder:
             )
         )
 
-        if self._task.scenario.pedestrian == "compliant":
+        scenario = self._task.scenario
+        if scenario.pedestrian_body == "compliant" or scenario.pedestrians != "replay":
             people = self._task.people
             there = people.present
             self._people.append((people.pedestrian[there], people.position[there], people.velocity[there]))
@@ -115,11 +116,14 @@ class Recorder:
         )
 
     def _pedestrians(self, time: Array) -> dict[str, NDArray[Any]]:
-        """Motion of the people: the recording's, or what was noted of those who yield."""
+        """Motion of the people: the recording's, or what was noted of those who react or can be held back."""
         series = _pedestrian_series(self._task.recording, self._task.cast, time, self._task.scenario.control_timestep)
+        recorded = series["pedestrian_position"].copy()
         for k, (pedestrian, position, velocity) in enumerate(self._people):
             series["pedestrian_position"][k, pedestrian] = position
             series["pedestrian_velocity"][k, pedestrian] = velocity
+        if self._people:
+            series["pedestrian_deviation"] = series["pedestrian_position"] - recorded
         return series
 
     def _contacts(self) -> dict[str, NDArray[Any]]:

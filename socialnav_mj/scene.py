@@ -16,6 +16,8 @@ REARM_TIME = "contact_rearm_time"
 """Name of the model's number that says how long two bodies must be apart before a touch counts as new [s]."""
 AGENT_SLOTS = "agent_slots"
 """Name of the model's number of slots for robots; a pool that grows has fewer robots at first."""
+UNICYCLE = "unicycle"
+"""Name of the number that a model has whose robots follow their commands exactly."""
 PERSON_MASS = 75.0
 """Of a person who yields: the effective mass behind a lower leg, ISO/TS 15066 table A.3, an adult's [kg]."""
 _TOLERANCE = 1e-6
@@ -82,6 +84,9 @@ def build_model(
     for slot in range(n_agent_slots if n_robots is None else n_robots):
         robot = mujoco.MjSpec.from_file(str(_robot_file(scenario.robot, assets)))
         robot.geom("bumper").size[0] = scenario.robot.radius
+        if scenario.floor_friction is not None:
+            for wheel in ("left_wheel", "right_wheel"):
+                robot.geom(wheel).friction[0] = scenario.floor_friction
         robot.actuator("forward").ctrlrange = [0.0, scenario.robot.max_speed]
         robot.actuator("yaw").ctrlrange = [-scenario.max_yaw_rate, scenario.max_yaw_rate]
         for body in robot.bodies[1:]:
@@ -92,7 +97,7 @@ def build_model(
         person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
         person.geom("body").size[0] = scenario.pedestrian_radius
         frame = _apart(arena, slot, row=1)
-        if scenario.pedestrian == "compliant":
+        if scenario.pedestrian_body == "compliant":
             person.body("pedestrian").mocap = False
             frame = _carrier(arena, slot).add_frame()
         arena.attach(person, prefix=pedestrian_name(slot), frame=frame)
@@ -102,6 +107,8 @@ def build_model(
         geom.userdata = [geom.contype, geom.conaffinity]
     arena.add_numeric(name=REARM_TIME, data=[scenario.contact_rearm_time], size=1)
     arena.add_numeric(name=AGENT_SLOTS, data=[n_agent_slots], size=1)
+    if scenario.plant == "unicycle":
+        arena.add_numeric(name=UNICYCLE, data=[1.0], size=1)
     model = arena.compile()
     _check_robot(model, scenario.robot)
     return model

@@ -7,15 +7,18 @@ from dm_control.suite import base
 from dm_env import specs
 from numpy.typing import NDArray
 
-from socialnav_mj.cast import NOBODY, Cast, Replay, cast_recording
+from socialnav_mj.action import twist_of_action, wheel_speed_spec
+from socialnav_mj.cast import NOBODY, Cast, cast_recording
 from socialnav_mj.collision import Collision, collisions_of
 from socialnav_mj.config import Scenario
+from socialnav_mj.crowd import crowd_of
 from socialnav_mj.entrance import AgentQueue, Ghosts, is_free
 from socialnav_mj.episode import IntArray, Outcome
-from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
+from socialnav_mj.geometry import Array
 from socialnav_mj.observation import observe
 from socialnav_mj.outcome import OVERTURNED_TILT
 from socialnav_mj.physics import Physics
+from socialnav_mj.reaction import Movers
 from socialnav_mj.recordings import Recording
 from socialnav_mj.sample import Sample, people_of
 
@@ -56,7 +59,7 @@ class CrowdTask(base.Task):
         self.recording = recording
         self.scenario = scenario
         self.cast: Cast = cast_recording(recording, scenario, replaced=replaced)
-        self._replay = Replay(recording, scenario, self.cast)
+        self._crowd = crowd_of(recording, scenario, self.cast)
         self._clear()
 
     def _clear(self) -> None:
@@ -72,7 +75,8 @@ class CrowdTask(base.Task):
         self._goal_distance = np.zeros(slots)
         self._reward = np.zeros(slots)
         self._sample = Sample.nobody(slots)
-        self.people = self._replay.crowd(0)
+        self._crowd.begin()
+        self.people = self._crowd.crowd(0)
 
     @property
     def time(self) -> float:
@@ -96,14 +100,9 @@ class CrowdTask(base.Task):
             physics: Not used; the limits are the scenario's.
 
         Returns:
-            Bounds of a single wheel. The tendon actuators also hold forward speed and yaw rate within theirs.
+            See `action.wheel_speed_spec`.
         """
-        robot, turn = self.scenario.robot, self.scenario.max_yaw_rate
-        corners = wheel_speed_of_twist(
-            [[0.0, turn], [robot.max_speed, turn]], wheel_radius=robot.wheel_radius, track=robot.track
-        )
-        shape = (self.cast.n_agent_slots, 2)
-        return specs.BoundedArray(shape, float, minimum=corners.min(), maximum=corners.max(), name="wheel_speed")
+        return wheel_speed_spec(self.scenario, self.cast.n_agent_slots)
 
     def reward_spec(self, physics: Physics) -> specs.Array:
         """One reward a slot.
@@ -128,7 +127,7 @@ class CrowdTask(base.Task):
         self._sample = Sample.of(physics, self._slot_agent)
 
     def before_step(self, action: Array, physics: Physics) -> None:
-        """Turn wheel speeds into tendon commands and set people in motion.
+        """Turn wheel speeds into commands of the plant, let people react, and set them in motion.
 
         Args:
             action: Wheel speeds (left, right), shape (n_slots, 2) [rad/s]; rows of empty slots are ignored.
@@ -137,22 +136,11 @@ class CrowdTask(base.Task):
         Raises:
             ValueError: If the shape is wrong or a row of an active slot is not finite.
         """
-        action = np.asarray(action, dtype=float)
-        shape = (self.cast.n_agent_slots, 2)
-        if action.shape != shape:
-            raise ValueError(f"action has shape {action.shape}; expected {shape} = (n_agents, (left, right))")
-        active = self._slot_agent != NOBODY
-        if not np.isfinite(action[active]).all():
-            slot = int(np.flatnonzero(active & ~np.isfinite(action).all(axis=1))[0])
-            raise ValueError(
-                f"action[{slot}] = {action[slot]} of an active agent at {self.time:.2f} s; expected finite wheel speeds"
-            )
-        robot = self.scenario.robot
-        twist = twist_of_wheel_speed(
-            np.where(active[:, None], action, 0.0), wheel_radius=robot.wheel_radius, track=robot.track
-        )
-        physics.set_twist(twist)
-        physics.set_pedestrian_path(*self._replay.motion(self.step))
+        under_way = self._slot_agent != NOBODY
+        physics.set_twist(twist_of_action(action, under_way, self.scenario, time=self.time))
+        robots = Movers(position=self._sample.position[under_way], velocity=self._sample.velocity[under_way])
+        self._crowd.react(self.step, self.people, robots)
+        physics.set_pedestrian_path(*self._crowd.motion(self.step))
 
     def after_step(self, physics: Physics) -> None:
         """Advance the clock; end runs, let people and agents in, and account for all of it.
@@ -232,7 +220,7 @@ class CrowdTask(base.Task):
 
     def _update_pedestrians(self, physics: Physics) -> None:
         """Place people at the current step; whoever appears on a robot stays contact-free until clear of all robots."""
-        now = self._replay.crowd(self.step)
+        now = self._crowd.crowd(self.step)
         physics.park_pedestrians(now.changed)
         there = now.present
         physics.set_pedestrian_pose(there, now.position[there], now.quaternion[there], now.velocity[there])
@@ -266,7 +254,7 @@ class CrowdTask(base.Task):
 
     def _note_collisions(self, physics: Physics) -> list[int]:
         """Translate new touches from slots to people; slots of the agents struck in this step, once a touch."""
-        present = self._replay.crowd(self.step - 1).pedestrian
+        present = self._crowd.crowd(self.step - 1).pedestrian
         new = collisions_of(physics.new_touches(), agent=self._slot_agent, pedestrian=present)
         self.collisions += new
         struck = [slot for collision in new for slot in collision.agent_slots]

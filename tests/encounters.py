@@ -188,6 +188,12 @@ ORDINARY: dict[str, float] = {
     "time_shoved_standing": 0.0,
     "largest_held_back": NAN,
     "spawn_delay": 0.0,
+    "deviation_imposed": 0.0,
+    "delay_imposed": 0.0,
+    "tracking_error": 0.0,
+    "unmet_share": 0.0,
+    "side_slip": 0.0,
+    "stopping_distance": NAN,
 }
 """Of an agent that drives 8 m straight at 1 m/s to within 0.5 m of its goal and touches nobody."""
 

@@ -46,6 +46,8 @@ class Agent:
     """Id; its index if not given."""
     ghosts: int = 0
     """People who appeared on it."""
+    twist: ArrayLike | None = None
+    """(k - 1, 2) commanded; what was driven if not given [m/s], [rad/s]."""
     policy: ArrayLike = 0
     """Index into the policies, one number or one for each of the k - 1 active samples."""
 
@@ -58,6 +60,8 @@ class Pedestrian:
     """(k, 2), k >= 1 [m]."""
     first_step: int = 0
     """Sample of the first position."""
+    deviation: ArrayLike = 0.0
+    """From the recorded place, (k, 2) or one number [m]."""
     person: int | None = None
     """Id; 1000 + its index if not given."""
 
@@ -146,8 +150,9 @@ def build_episode(
             continue
         active = slice(first[i], last[i])
         robot = scenario.robot
+        commanded = agents[i].twist
         wheel_speed[active, i] = wheel_speed_of_twist(
-            twist[active, i], wheel_radius=robot.wheel_radius, track=robot.track
+            twist[active, i] if commanded is None else commanded, wheel_radius=robot.wheel_radius, track=robot.track
         )
         policy[active, i] = agents[i].policy
     tilt = np.where(np.isnan(body["heading"]), np.nan, 0.0)
@@ -159,8 +164,12 @@ def build_episode(
     goal, start = goal.reshape(n, 2), start.reshape(n, 2)
     spawn_time = np.where(spawned, start_time + step * first, np.nan)
     allowed = np.array([step * scenario.allowed_steps(float(d)) for d in np.hypot(*(goal - start).T)], dtype=float)
-    person = [i if a.person is None else a.person for i, a in enumerate(agents)]
+    ids = [i if a.person is None else a.person for i, a in enumerate(agents)]
     crowd = _samples(walks, np.array([p.first_step for p in pedestrians], dtype=np.int64), t, step)
+    anybody = any(np.any(person.deviation) for person in pedestrians)
+    deviation = np.where(np.isnan(crowd["position"]), np.nan, 0.0)
+    for j, (person, track) in enumerate(zip(pedestrians, walks, strict=True)):
+        deviation[person.first_step : person.first_step + len(track), j] += person.deviation
     rows = _contacts(touches, body, crowd, start_time=start_time, step=step)
     policies = policies or (controller,)
     digest = hashlib.sha256()
@@ -168,7 +177,7 @@ def build_episode(
         digest.update(np.ascontiguousarray(array).tobytes())
     return Episode(
         time=time,
-        agent_person=np.array(person, dtype=np.int64),
+        agent_person=np.array(ids, dtype=np.int64),
         agent_start=start,
         agent_goal=goal,
         agent_appear_time=start_time + step * (first - np.array([a.delay_steps for a in agents], dtype=float)),
@@ -185,6 +194,7 @@ def build_episode(
             [1000 + j if p.person is None else p.person for j, p in enumerate(pedestrians)], dtype=np.int64
         ),
         **{f"pedestrian_{name}": value for name, value in crowd.items() if name != "yaw_rate"},
+        pedestrian_deviation=deviation if anybody else None,
         **rows,
         policies=policies,
         metadata={

@@ -72,19 +72,19 @@ class Case:
         return float(self.speed * reduced_mass(np.array([bearing]))[0]) + self.grip
 
 
-def run(side: str, speed: float, *, physics_timestep: float = 0.01, pedestrian: str = "rigid") -> Case:
+def run(side: str, speed: float, *, physics_timestep: float = 0.01, pedestrian_body: str = "rigid") -> Case:
     """Walk into a robot that stands.
 
     Args:
         side: Of `SIDES`.
         speed: [m/s].
         physics_timestep: [s].
-        pedestrian: Kind of the walker.
+        pedestrian_body: Kind of the walker.
 
     Returns:
         The case with its only touch.
     """
-    scenario = Scenario(physics_timestep=physics_timestep, pedestrian=pedestrian)
+    scenario = Scenario(physics_timestep=physics_timestep, pedestrian_body=pedestrian_body)
     bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
     physics = Physics.from_mujoco(build_model(scenario, n_agent_slots=1, n_pedestrian_slots=1, **bounds))
     with physics.reset_context():
@@ -105,9 +105,9 @@ def run(side: str, speed: float, *, physics_timestep: float = 0.01, pedestrian: 
     return Case(side=side, speed=speed, touch=touch, moved=moved)
 
 
-def cases(pedestrian: str = "rigid") -> list[Case]:
+def cases(pedestrian_body: str = "rigid") -> list[Case]:
     """All sides and speeds."""
-    return [run(side, speed, pedestrian=pedestrian) for side in SIDES for speed in SPEEDS]
+    return [run(side, speed, pedestrian_body=pedestrian_body) for side in SIDES for speed in SPEEDS]
 
 
 def force_table() -> str:
@@ -133,17 +133,17 @@ def force_table() -> str:
     return "\n".join(table(headings, rows))
 
 
-def drive(walk: float, *, pedestrian: str = "rigid") -> Touch:
+def drive(walk: float, *, pedestrian_body: str = "rigid") -> Touch:
     """Drive at 1 m/s into somebody ahead who walks along, stands, or comes.
 
     Args:
         walk: Velocity of the person along the robot's way [m/s].
-        pedestrian: Its kind.
+        pedestrian_body: Its kind.
 
     Returns:
         The first touch.
     """
-    scenario = Scenario(pedestrian=pedestrian)
+    scenario = Scenario(pedestrian_body=pedestrian_body)
     bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
     physics = Physics.from_mujoco(build_model(scenario, n_agent_slots=1, n_pedestrian_slots=1, **bounds))
     with physics.reset_context():
@@ -189,7 +189,7 @@ def drive_table() -> str:
     headings = ["person ahead, velocity [m/s]", "two bodies [N s]", "impact: impulse [N s]", "largest force [N]"]
     rows = []
     for walk in WALKS:
-        rigid, compliant = drive(walk), drive(walk, pedestrian="compliant")
+        rigid, compliant = drive(walk), drive(walk, pedestrian_body="compliant")
         momentum = flesh_of(rigid) * float(np.sqrt(reduced_mass(np.zeros(1))[0] / LEG_STIFFNESS))
         impulse, force = ([getattr(t, name) for t in (rigid, compliant)] for name in ("impact_impulse", "impact_force"))
         told = [f"{impulse[0]:.1f} / {impulse[1]:.1f}", f"{force[0]:.0f} / {force[1]:.0f}", f"{flesh_of(rigid):.0f}"]

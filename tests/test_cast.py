@@ -128,7 +128,7 @@ def test_person_whose_track_ends_between_two_steps_waits_at_its_end() -> None:
 
 def test_mean_velocity_leads_from_place_to_place_within_a_control_step_and_into_the_next() -> None:
     recording = recording_of(*busy_crowd(12, seed=4))
-    scenario = Scenario(share=0.3, pedestrian="compliant")
+    scenario = Scenario(share=0.3, pedestrian_body="compliant")
     cast = cast_recording(recording, scenario)
     replay, met = Replay(recording, scenario, cast), 0
     for step in range(replay._steps):

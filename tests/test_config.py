@@ -63,7 +63,7 @@ def test_configuration_cannot_be_changed() -> None:
         ("seed", "1", "integers >= 0"),
         ("turn_limit", "per_minute", "per_step, per_second"),
         ("on_collision", "stop", "continue, retire"),
-        ("pedestrian", "soft", "rigid, compliant"),
+        ("pedestrian_body", "soft", "rigid, compliant"),
         ("pedestrian_radius", 0.0, r"numbers in \[0\.05, 0\.4\]"),
         ("pedestrian_radius", 0.41, r"numbers in \[0\.05, 0\.4\]"),
         ("pedestrian_radius", 0.079, r"at least 0\.08 with Robot\.radius = 0\.17, or people walk through robots"),

@@ -53,7 +53,7 @@ def test_force_of_a_robot_that_drives_follows_the_closing_speed_only_where_peopl
     forces = [touch.impact_force for touch in rigid]
     assert max(forces) < 1.15 * min(forces) and forces[-1] > 2.0 * flesh_of(rigid[-1])
     for walk in WALKS:
-        touch = drive(walk, pedestrian="compliant")
+        touch = drive(walk, pedestrian_body="compliant")
         assert touch.impact_force == pytest.approx(0.55 * flesh_of(touch), rel=0.05)
 
 

@@ -63,7 +63,19 @@ def as_human_row(episode):
     return replace(episode, **{f"contact_{name}": nothing for name in FORCE_COLUMNS})
 
 
+def pushing():
+    """Two agents, one of which is told to stop after 0.6 s; a person between them leaves its track, more and more."""
+    way = np.stack([np.array([0.0, 0.2, 0.4, 0.6, 0.75, 0.8, 0.8, 0.8, 0.8]), np.zeros(9)], axis=1)
+    told = np.stack([np.array([1.0] * 3 + [0.0] * 5), np.zeros(8)], axis=1)
+    stopping = Agent(positions=way, goal=(9, 0), outcome=Outcome.UNFINISHED, twist=told)
+    waiting = Agent(positions=np.full((9, 2), (0.0, 2.2)), goal=(9, 2), outcome=Outcome.UNFINISHED)
+    off = np.stack([np.linspace(0.0, -0.8, 9), np.linspace(0.0, 0.4, 9)], axis=1)
+    person = Pedestrian(positions=np.array([0.0, 1.0]) + 0.01 * np.arange(9)[:, None] * (1.0, 0.0), deviation=off)
+    return build_episode([stopping, waiting], [person])
+
+
 EDGES = {
+    "pushing": pushing(),
     "no agents": build_episode([], [standing((0, 0), 3)]),
     "nobody at all": build_episode([]),
     "never spawned": build_episode([Agent(positions=[(0, 0)], outcome=Outcome.NEVER_SPAWNED, goal=(3, 4))]),
@@ -111,6 +123,21 @@ def test_edges_show_every_nan_rule_at_work():
     assert idle == [] and there == []
 
 
+def test_agents_pay_for_the_way_that_they_push_people_off_and_for_the_stop_that_takes_long():
+    """The deviation grows by |(-.8, .4)| / 8 a step; the standing agent, at 1.2 m, is nearer from step 4 on."""
+    values = per_agent(EDGES["pushing"])
+    step = np.hypot(0.1, 0.05)
+    np.testing.assert_allclose(values["deviation_imposed"], [4 * step, 4 * step])
+    # Behind by 0.1 m a step along the heading; the recorded track goes by (0.11, -0.05) m a step.
+    late = 0.1 / (np.hypot(0.11, 0.05) / 0.2)
+    np.testing.assert_allclose(values["delay_imposed"], [4 * late, 4 * late])
+    assert values["stopping_distance"][0] == pytest.approx(0.2) and np.isnan(values["stopping_distance"][1])
+    # Told to stop and 0.15 and 0.05 m farther in two of eight steps.
+    np.testing.assert_allclose(values["tracking_error"], [0.2 / 8, 0.0], atol=1e-9)
+    # Not as commanded at the ends of steps 2 (0.75 m/s for 1), 3 and 4 (0.25 m/s for 0).
+    assert values["unmet_share"].tolist() == [2 / 8, 0.0] and values["side_slip"].tolist() == [0.0, 0.0]
+
+
 def altered(episode, need):
     """An episode that differs in one thing that a metric may read."""
     if need is Need.GOAL:
@@ -128,6 +155,12 @@ def altered(episode, need):
         return replace(episode, agent_tilt=0.9 * episode.agent_tilt + 0.2)
     if need is Need.PEDESTRIANS:
         return replace(episode, pedestrian_position=0.4 * episode.pedestrian_position + (0.1, 0.3))
+    if need is Need.DEVIATIONS:
+        growth = 0.1 * np.arange(len(episode.time))[:, None, None] * np.array([-1.0, 0.3])
+        off = episode.pedestrian_deviation
+        return episode if off is None else replace(episode, pedestrian_deviation=off + growth)
+    if need is Need.DRIVE:
+        return replace(episode, agent_wheel_speed=0.0 * episode.agent_wheel_speed)
     if need is Need.CONTACTS:
         names = [name for name in vars(episode) if name.startswith("contact_")]
         return replace(episode, **{name: getattr(episode, name)[:0] for name in names})

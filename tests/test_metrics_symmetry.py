@@ -72,12 +72,16 @@ def test_metrics_are_invariant_when_the_map_is_rotated_moved_or_mirrored(cast, a
     moved = {}
     for name in (f.name for f in fields(episode)):
         value = getattr(episode, name)
+        if value is None:
+            continue
         if name.endswith(points):
             moved[name] = value @ turn.T + shift
-        elif name.endswith(("_velocity", "_normal")):
+        elif name.endswith(("_velocity", "_normal", "_deviation")):
             moved[name] = value @ turn.T
         elif name.endswith("_heading"):
             moved[name] = angle + (-value if flip else value)
+        elif name == "agent_wheel_speed" and flip:
+            moved[name] = value[..., ::-1].copy()
     same(episode, replace(episode, **moved))
 
 

@@ -19,9 +19,9 @@ TIMESTEP = 0.01
 SOUTH = walk([(0, 0), (0, -9)], 1.0)
 
 
-def scene(n_agents: int = 1, n_pedestrians: int = 1, *, pedestrian: str = "compliant") -> Physics:
+def scene(n_agents: int = 1, n_pedestrians: int = 1, *, pedestrian_body: str = "compliant") -> Physics:
     """Robots at (0, 3 i); people in contact with the world 5 m away."""
-    scenario = Scenario(pedestrian=pedestrian)
+    scenario = Scenario(pedestrian_body=pedestrian_body)
     bounds = {"low": np.full(2, -5.0), "high": np.full(2, 5.0)}
     physics = Physics.from_mujoco(
         build_model(scenario, n_agent_slots=n_agents, n_pedestrian_slots=n_pedestrians, **bounds)
@@ -59,7 +59,7 @@ def test_who_meets_nobody_is_within_a_millimetre_of_the_recording(control_timest
     # The robot drives away from all others.
     crowd = [SOUTH, *busy_crowd(12, seed=3), walk([(0, 4), (3, 4), (3, 5), (0, 5)], 1.6, begin=0.5)]
     crowd[1:] = [type(w)(w.times, w.positions + np.array([0.0, 6.0])) for w in crowd[1:]]
-    sizes = {"pedestrian": "compliant", "control_timestep": control_timestep, "turn_limit": "per_second"}
+    sizes = {"pedestrian_body": "compliant", "control_timestep": control_timestep, "turn_limit": "per_second"}
     environment = environment_of(*crowd, agents=[1], **sizes)
     environment.reset()
     task, worst = environment.task, 0.0
@@ -76,8 +76,8 @@ def test_who_meets_nobody_is_within_a_millimetre_of_the_recording(control_timest
 
 def test_robot_between_two_people_is_squeezed_by_what_people_push_with() -> None:
     # They come from both sides and would walk through each other; the robot is struck from the left and right.
-    def held(pedestrian: str) -> tuple[list[Touch], Physics]:
-        physics = scene(1, 2, pedestrian=pedestrian)
+    def held(pedestrian_body: str) -> tuple[list[Touch], Physics]:
+        physics = scene(1, 2, pedestrian_body=pedestrian_body)
         return lead(physics, along(-0.8, 0.5, 400), along(0.8, -0.5, 400)), physics
 
     rigid, _ = held("rigid")
@@ -150,7 +150,7 @@ def test_parked_people_wait_below_the_floor_and_come_with_the_recorded_velocity(
 
 def test_person_who_appears_on_a_robot_passes_through_it_undisturbed() -> None:
     person = walk([(0.1, 0.0), (3.0, 0.0)], 1.0, begin=1.0)
-    environment = environment_of(walk([(0, 0), (9, 0)], 1.0), person, agents=[1], pedestrian="compliant")
+    environment = environment_of(walk([(0, 0), (9, 0)], 1.0), person, agents=[1], pedestrian_body="compliant")
     environment.reset()
     for _ in range(15):
         environment.step(still(environment))
@@ -161,7 +161,7 @@ def test_person_who_appears_on_a_robot_passes_through_it_undisturbed() -> None:
 def test_episode_and_observation_tell_where_the_bodies_are() -> None:
     # A robot that stands, between a walker and somebody who walks the other way: both are held.
     crowd = walk([(0, 0), (9, 0)], 1.0), walk([(-2, 0), (8, 0)], 1.0), walk([(2, 0), (-8, 0)], 1.0)
-    environment = environment_of(*crowd, agents=[1], pedestrian="compliant")
+    environment = environment_of(*crowd, agents=[1], pedestrian_body="compliant")
     environment.reset()
     for _ in range(15):
         seen = environment.step(still(environment)).observation
@@ -171,7 +171,7 @@ def test_episode_and_observation_tell_where_the_bodies_are() -> None:
     assert np.linalg.norm(people.velocity, axis=1).max() < 0.1
     gaps = np.linalg.norm(seen["pedestrian_position"][0][seen["pedestrian_mask"][0]], axis=-1)
     np.testing.assert_allclose(gaps, np.linalg.norm(people.position - environment.physics.agent_position()[0], axis=1))
-    episode = rollout(environment_of(*crowd, agents=[1], pedestrian="compliant"), GoStraight())
+    episode = rollout(environment_of(*crowd, agents=[1], pedestrian_body="compliant"), GoStraight())
     rigid = rollout(environment_of(*crowd, agents=[1]), GoStraight())
     k = 8  # the walker from behind is slower than the robot; the other one is met at 1 s
     both = min(len(episode.time), len(rigid.time))
@@ -183,7 +183,7 @@ def test_episode_and_observation_tell_where_the_bodies_are() -> None:
 def test_equal_configurations_give_equal_bits_and_another_kind_of_people_other_ones() -> None:
     crowd, agents = busy_crowd(8, seed=1), [2, 5, 6]
     episodes = [
-        rollout(environment_of(*crowd, agents=agents, pedestrian=kind), GoStraight())
+        rollout(environment_of(*crowd, agents=agents, pedestrian_body=kind), GoStraight())
         for kind in ("compliant", "compliant", "rigid")
     ]
     hashes = [episode.metadata["state_hash"] for episode in episodes]
@@ -194,7 +194,7 @@ def test_equal_configurations_give_equal_bits_and_another_kind_of_people_other_o
 
 def test_copy_of_the_physics_goes_on_alike() -> None:
     crowd = walk([(0, 0), (9, 0)], 1.0), walk([(2, 0), (-8, 0)], 1.0), stand((3, 3), 0.0, 9.0)
-    one, two = (environment_of(*crowd, agents=[1], pedestrian="compliant") for _ in range(2))
+    one, two = (environment_of(*crowd, agents=[1], pedestrian_body="compliant") for _ in range(2))
     for environment in (one, two):
         environment.reset()
         for _ in range(8):

@@ -64,11 +64,19 @@ def test_same_run_twice_is_bitwise_the_same_in_new_and_in_used_environments():
     assert rollout(environment, GoStraight()).metadata["state_hash"] != one.metadata["state_hash"]
 
 
-@pytest.mark.parametrize("pedestrian", ["rigid", "compliant"])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"pedestrian_body": "compliant"},
+        {"pedestrians": "yielding", "plant": "unicycle"},
+        {"pedestrians": "weak", "pedestrian_body": "compliant"},
+    ],
+)
 @pytest.mark.parametrize(("slots", "robots"), [(5, 5), (0, -3)])
-def test_size_of_the_pool_changes_no_bit_of_an_episode(pedestrian, slots, robots, monkeypatch):
+def test_size_of_the_pool_changes_no_bit_of_an_episode(settings, slots, robots, monkeypatch):
     """A pool that is larger, and one of a single robot that grows while agents and people touch."""
-    environment = busy(pedestrian=pedestrian)
+    environment = busy(**settings)
     expected, n_agents = rollout(environment, PotentialField(), scenario_name="made"), environment.physics.n_agents
     assert len(expected.contact_time) and n_agents == 4
 

@@ -43,7 +43,7 @@ def test_scenario_decides_radii_limits_and_time_step() -> None:
 
 
 def test_people_who_yield_are_bodies_of_75_kg_that_slide_and_else_the_same() -> None:
-    rigid, yielding = model_of(Scenario()), model_of(Scenario(pedestrian="compliant"))
+    rigid, yielding = model_of(Scenario()), model_of(Scenario(pedestrian_body="compliant"))
     assert (yielding.nmocap, yielding.nu, yielding.nv) == (0, 6, 24 + 2 * 2)
     assert yielding.body_mass.sum() == pytest.approx(rigid.body_mass.sum() + 2 * 75.0)
     for field in ("type", "size", "contype", "conaffinity", "friction", "solref", "solimp"):

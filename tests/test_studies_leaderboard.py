@@ -12,8 +12,9 @@ from socialnav_mj.report import style
 from socialnav_mj.studies.leaderboard.board import board_of
 from socialnav_mj.studies.leaderboard.families import Family, compare, families_of, verdict
 from socialnav_mj.studies.leaderboard.ranks import rank
-from socialnav_mj.studies.leaderboard.study import CONTROLLERS, Leaderboard
+from socialnav_mj.studies.leaderboard.study import Leaderboard
 from socialnav_mj.studies.panel import Entry
+from socialnav_mj.studies.study import CONTROLLERS
 
 TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
 

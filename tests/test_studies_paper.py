@@ -75,6 +75,8 @@ def test_variants_change_what_they_say_and_nothing_else(whole):
     assert runs["radii_0.25"].evaluation.task_kwargs == {"pedestrian_radius": 0.08}
     assert runs["radii_0.40"].evaluation.task_kwargs == {"pedestrian_radius": 0.23}
     assert runs["turn_per_second"].evaluation.task_kwargs == {"turn_limit": "per_second"}
+    assert runs["yielding"].evaluation.task_kwargs == {"pedestrians": "yielding"}
+    assert runs["unicycle"].evaluation.task_kwargs == {"plant": "unicycle"}
     assert runs["retire"].evaluation.task_kwargs == {"on_collision": "retire"}
     anyone = [make_controller(c) for c in runs["switch_anyone"].evaluation.controllers]
     assert [(c.who, c.switch_distance) for c in anyone] == [("anyone", 2.0)] * 2

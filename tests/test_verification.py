@@ -48,7 +48,7 @@ def test_episodes_and_traces_of_a_resumed_run_give_the_same_states(run: Path, n_
 
 
 def test_episodes_and_traces_of_people_who_yield_give_the_same_states(tmp_path: Path) -> None:
-    wide = {"robot_radius": 0.3, "pedestrian_radius": 0.3, "pedestrian": "compliant"}
+    wide = {"robot_radius": 0.3, "pedestrian_radius": 0.3, "pedestrian_body": "compliant"}
     plan = Evaluation(
         dataset=TINY, scenarios=("scenario_3",), controllers=("go_straight",), draws=1, seed=1, task_kwargs=wide
     )

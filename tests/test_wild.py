@@ -22,7 +22,9 @@ def test_wild_episode_breaks_no_rule(seed: int) -> None:
 
 
 def test_jumping_crowd_of_people_who_yield_leaves_the_numbers_finite() -> None:
-    run = run_wild(0, pedestrian="compliant")  # somebody who is driven along a jump throws a robot out of the numbers
+    run = run_wild(
+        0, pedestrian_body="compliant"
+    )  # somebody who is driven along a jump throws a robot out of the numbers
     assert run.broken == [] and len(run.episode.contact_time)
 
 

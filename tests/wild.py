@@ -341,18 +341,18 @@ def thrown_out(timestep: float) -> float:
     return fastest
 
 
-def run_wild(seed: int, *, pedestrian: str = "rigid") -> Run:
+def run_wild(seed: int, *, pedestrian_body: str = "rigid") -> Run:
     """Make and run one wild episode, every fourth one twice, and hold it to the rules.
 
     Args:
         seed: Of everything in it.
-        pedestrian: Kind of the people.
+        pedestrian_body: Kind of the people.
 
     Returns:
         What happened; its list of what broke is empty if all is well.
     """
     random = np.random.default_rng(seed)
-    recording, scenario = wild_recording(random), replace(wild_scenario(random), pedestrian=pedestrian)
+    recording, scenario = wild_recording(random), replace(wild_scenario(random), pedestrian_body=pedestrian_body)
     controller = wild_controller(random)
     plain = build_environment(recording, scenario)
     watched = WatchedPhysics.from_mujoco(plain.physics.model.ptr)

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 from dm_control.rl.control import PhysicsError
 
-from socialnav_mj.cli.board import Leaderboard
+from socialnav_mj.cli.board import Leaderboard, PeopleAsRobots, Plant, Reaction
 from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench, StepSize
@@ -37,6 +37,9 @@ Command = (
     | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
     | Annotated[Gains, tyro.conf.subcommand("gains")]
     | Annotated[Leaderboard, tyro.conf.subcommand("leaderboard")]
+    | Annotated[Reaction, tyro.conf.subcommand("reaction")]
+    | Annotated[Plant, tyro.conf.subcommand("plant")]
+    | Annotated[PeopleAsRobots, tyro.conf.subcommand("people-as-robots")]
 )
 
 

@@ -1,14 +1,15 @@
-"""The sub-command `leaderboard`."""
+"""The sub-commands of all controllers side by side: `leaderboard`, `reaction` and `plant`."""
 
 import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
+from socialnav_mj.cli.console import say
 from socialnav_mj.cli.study import run_study
 
 
@@ -52,10 +53,11 @@ class Leaderboard:
     def run(self) -> None:
         """Run what is missing behind a bar, then write tables, figure and page, and copy them if asked to."""
         from socialnav_mj.studies.leaderboard import study as leaderboard
+        from socialnav_mj.studies.study import CONTROLLERS
 
         study = leaderboard.Leaderboard(
             recordings=self.recordings,
-            controllers=(*(self.controllers or leaderboard.CONTROLLERS), *self.also),
+            controllers=(*(self.controllers or CONTROLLERS), *self.also),
             data_dir=None if self.data_dir is None else str(self.data_dir),
             trainings=self.trainings,
             settings=self.settings,
@@ -95,3 +97,119 @@ def read_costs(path: Path) -> dict[str, float]:
         raise ValueError(
             f"{path} is not a file of `socialnav-mj bench --controllers ... --out FILE`: {error!r}"
         ) from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Conditions:
+    """Options of both studies of conditions."""
+
+    recordings: tuple[str, ...] = ("students003", "zara01", "plaza")
+    """Names in the catalogue, or paths."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    controllers: tuple[str, ...] = ()
+    """As in `evaluate`; those of the leaderboard by default."""
+    also: tuple[str, ...] = ()
+    """Controllers that join them."""
+    scenarios: Scenarios = (1, 2, 3, 4)
+    """Scenarios to run."""
+    draws: int = 10
+    """Random choices of the replaced people."""
+    seed: int = 100
+    """Seed of the first draw; the others count up from it. Draws below 100 are for choosing, not for reporting."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    publish: Folder = None
+    """Folder that gets a copy of tables, figures and page: all that holds no recording and no episode."""
+
+    def study(self, conditions: Any) -> Any:
+        """The study that the options ask for.
+
+        Args:
+            conditions: Settings that are compared, the first with all others.
+
+        Returns:
+            A `studies.conditions.ConditionStudy`.
+        """
+        from socialnav_mj.studies.conditions import ConditionStudy
+        from socialnav_mj.studies.study import CONTROLLERS
+
+        return ConditionStudy(
+            recordings=self.recordings,
+            conditions=conditions,
+            controllers=(*(self.controllers or CONTROLLERS), *self.also),
+            data_dir=None if self.data_dir is None else str(self.data_dir),
+            scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
+            draws=self.draws,
+            seed=self.seed,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reaction(_Conditions):
+    """Run every controller among people who keep to the recording, give way weakly, and give way as to each other.
+
+    Writes slope charts, tables and a page: what becomes of success, nearness and the ranking, and what robots cost the
+    people. If a run is interrupted, repeat the command to resume it.
+    """
+
+    out: Path = Path("reaction")
+    """Folder of the results."""
+
+    def run(self) -> None:
+        """Run what is missing behind a bar, then write tables, figures and page, and copy them if asked to."""
+        from socialnav_mj.studies.reaction.study import LEVELS, PUBLIC, write_reaction
+
+        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
+        run_study(self.study(LEVELS), write_reaction, PUBLIC, making="tables and figures", **folders)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plant(_Conditions):
+    """Run every controller on wheels, on an ideal unicycle, on a heavier base and on a slippery floor.
+
+    Writes charts, tables and a page: what a kinematic simulator would have told wrongly of each controller. If a run is
+    interrupted, repeat the command to resume it.
+    """
+
+    out: Path = Path("plant")
+    """Folder of the results."""
+
+    def run(self) -> None:
+        """Run what is missing behind a bar, then write tables, figures and page, and copy them if asked to."""
+        from socialnav_mj.studies.plant.study import PLANTS, PUBLIC, write_plant
+
+        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
+        run_study(self.study(PLANTS), write_plant, PUBLIC, making="tables and figures", **folders)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeopleAsRobots:
+    """Let each person's own recorded track play a robot, and see how far its neighbours, who have reacted, are moved.
+
+    Writes tables, a figure and a page; simulates no robots. Beside it the same tracks some seconds late, as strangers
+    whom nobody has reacted to yet.
+    """
+
+    recordings: tuple[str, ...] = ("zara01", "zara02")
+    """Names in the catalogue, or paths. The strengths are chosen on these two."""
+    data_dir: Folder = None
+    """Where recordings are looked for first."""
+    strengths: tuple[float, ...] = ()
+    """k of the push; those of the levels by default [m^2]."""
+    late: float = 8.0
+    """By which strangers are late [s]."""
+    out: Path = Path("people_as_robots")
+    """Folder of the results."""
+
+    def run(self) -> None:
+        """Compute, write, and print a line for each recording and strength."""
+        from socialnav_mj.recordings import load_recording
+        from socialnav_mj.studies.reaction.people_as_robots import write_test
+
+        data_dir = None if self.data_dir is None else str(self.data_dir)
+        recordings = [load_recording(name, data_dir=data_dir) for name in self.recordings]
+        page, lines = write_test(recordings, self.out, strengths=self.strengths, late=self.late)
+        for line in lines:
+            say(line)
+        say(f"report: {page}")

@@ -59,7 +59,8 @@ class Reproduce:
     variants: bool = False
     """Run the other settings and the sweep of the switch distance as well."""
     variant_draws: int | None = None
-    """Draws of the sweep and of all settings but the capped field and the other turn limit; all by default."""
+    """Draws of the sweep and of all settings but the capped field, the other turn limit, yielding people and the ideal
+    unicycle; all by default."""
     variant_trainings: int | None = None
     """Trainings of the same; all by default."""
     jobs: int = -1

@@ -93,7 +93,7 @@ class Stage:
         Args:
             episode: Its configuration and record.
         """
-        scenario = replace(Scenario.from_dict(episode.metadata["scenario"]), pedestrian="rigid")
+        scenario = replace(Scenario.from_dict(episode.metadata["scenario"]), pedestrian_body="rigid")
         self._agent_slot, n_agents = _slots(np.isfinite(episode.agent_heading))
         self._pedestrian_slot, n_people = _slots(np.isfinite(episode.pedestrian_heading))
         places = np.concatenate([episode.agent_start, episode.agent_goal, _finite(episode.pedestrian_position)])

@@ -50,10 +50,15 @@ def _fewer_than_3_samples(episode: Episode) -> BoolArray:
     return np.isfinite(episode.agent_heading).sum(axis=0) < 3
 
 
+def _no_command(episode: Episode) -> BoolArray:
+    return ~np.any(np.isfinite(episode.agent_wheel_speed[..., 0]), axis=0)
+
+
 NEVER = Missing(rule="-", where=_nowhere)
 NOT_ARRIVED = Missing(rule="not arrived", where=_not_arrived)
 NEVER_SPAWNED = Missing(rule="never spawned", where=_never_spawned)
 NO_STEP = Missing(rule="no step", where=_no_step)
 NO_STEP_WITH_PEOPLE = Missing(rule="no step with people in the scene", where=_no_step_with_people)
+NO_COMMAND = Missing(rule="no command (no step, human row)", where=_no_command)
 FEWER_THAN_2_SAMPLES = Missing(rule="< 2 samples", where=_fewer_than_2_samples)
 FEWER_THAN_3_SAMPLES = Missing(rule="< 3 samples", where=_fewer_than_3_samples)

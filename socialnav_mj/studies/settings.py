@@ -28,6 +28,8 @@ SETTINGS: dict[str, Setting] = {
     "turn_per_second": Setting(
         title="turn limit per second, policies trained for it", task_kwargs={"turn_limit": "per_second"}
     ),
+    "yielding": Setting(title="yielding people", task_kwargs={"pedestrians": "yielding"}),
+    "unicycle": Setting(title="ideal unicycle", task_kwargs={"plant": "unicycle"}),
     "radii_0.25": Setting(title="radii sum 0.25 m", task_kwargs={"pedestrian_radius": 0.08}),
     "radii_0.40": Setting(title="radii sum 0.40 m", task_kwargs={"pedestrian_radius": 0.23}),
     "retire": Setting(title="retire on collision", task_kwargs={"on_collision": "retire"}),

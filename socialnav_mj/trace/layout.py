@@ -52,6 +52,7 @@ KEY = """
 | balls | collisions, by closing speed; dots: earlier ones |
 | trails | the past 3 s |
 | sand | pedestrian |
+| white thread | from a pedestrian to where the recording has it |
 | ring | goal of a robot on its way |
 """
 """How to read the scene."""
@@ -72,7 +73,9 @@ def policy_colours(policies: Sequence[str]) -> list[Colour]:
     return [POLICIES[i % len(POLICIES)] for i in range(len(policies))]
 
 
-TRAIL_RADIUS, NAME_RADIUS = 0.025, 0.05
+TRAIL_RADIUS, NAME_RADIUS, THREAD_RADIUS = 0.025, 0.05, 0.015
+THREAD_LENGTH, THREAD_HEIGHT = 0.02, 0.4
+"""Shorter threads are not drawn; where they begin, at a person's knee [m]."""
 NAME_HEIGHT, TOUCH_HEIGHT = 1.0, 0.25
 """[m]."""
 

@@ -64,6 +64,7 @@ def write_scene(episode: Episode, sink: Sink, chosen: IntArray, low: Array, high
         sink.static(f"/scene/trails/{kind}", rr.Points3D.from_fields(colors=colour, radii=look.TRAIL_RADIUS))
         points = rr.Points3D.columns(positions=_in_space(position[mask], 0.01))
         sink.columns(f"/scene/trails/{kind}", episode.time, points.partition(mask.sum(axis=1)))
+    _threads(episode, sink)
     _goals(episode, sink)
     _names(episode, sink, chosen)
     _touches(episode, sink)
@@ -96,6 +97,23 @@ def _touched_people(episode: Episode) -> Mask:
         first, last = np.searchsorted(episode.time, (begin, end))
         result[first:last, episode.contact_partner[row]] = True
     return result
+
+
+def _threads(episode: Episode, sink: Sink) -> None:
+    """A line from everybody who is off its recorded track to where the recording has it; nothing if nobody ever is."""
+    off = episode.pedestrian_deviation
+    if off is None:
+        return
+    drawn = np.nan_to_num(np.hypot(off[..., 0], off[..., 1])) > look.THREAD_LENGTH
+    if not drawn.any():
+        return
+    counts = drawn.sum(axis=1)
+    rows = np.flatnonzero((counts > 0) | (np.diff(counts, prepend=0) != 0))
+    person = episode.pedestrian_position[drawn]
+    strips = np.stack([_in_space(person, look.THREAD_HEIGHT), _in_space(person - off[drawn], 0.0)], axis=1)
+    sink.static("/scene/people/threads", rr.LineStrips3D.from_fields(colors=look.WHITE, radii=look.THREAD_RADIUS))
+    lines = rr.LineStrips3D.columns(strips=strips)
+    sink.columns("/scene/people/threads", episode.time[rows], lines.partition(counts[rows]))
 
 
 def _goals(episode: Episode, sink: Sink) -> None:

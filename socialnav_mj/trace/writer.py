@@ -6,6 +6,7 @@
 | /scene/floor, goals | the ground; the goal region of every robot under way |
 | /scene/robots/driving, collided | one pose a robot and step; a robot changes over at its first touch |
 | /scene/people/walking, touched | one pose a person and step; touched for 2 s at least |
+| /scene/people/threads | one line a person who is off its recorded track, to where the recording has it |
 | /scene/trails/robots, people | where each was at each step; the views show the past 3 s |
 | /scene/touches/now, all | one row a touch: place, partner, severity; the views show the past 2 s, and all so far |
 | /scene/chosen | number of each robot that is followed closely |

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from socialnav_mj.controllers import BUILT_IN, with_policy_of, with_training
+from socialnav_mj.controllers import with_policy_of, with_training
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report.paired import HUMAN
@@ -17,10 +17,8 @@ from socialnav_mj.studies.leaderboard.figure import draw_fronts
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
 from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
-from socialnav_mj.studies.study import Run, Study, read_runs
+from socialnav_mj.studies.study import CONTROLLERS, Run, Study, read_runs
 
-CONTROLLERS = (*(name for name in BUILT_IN if name != "stand_still"), "mpc(preset='calm')", "mpc(preset='free')")
-"""All built-in ones but the one that goes nowhere, and the planner's other presets."""
 PUBLIC = ("README.md", "provenance.json", "tables", "figures")
 """What may travel with the project: no recordings, no episodes."""
 

@@ -56,6 +56,8 @@ VARIANTS: tuple[Variant, ...] = (
     DEFAULT,
     Variant(name="capped", title="capped field in the paper's place", field=CAPPED, runs=(MIXED,), is_full=True),
     _of_setting("turn_per_second", is_full=True),
+    _of_setting("yielding", is_full=True),
+    _of_setting("unicycle", is_full=True),
     _of_setting("radii_0.25"),
     _of_setting("radii_0.40"),
     _of_setting("retire"),

@@ -1,0 +1,162 @@
+"""People who react: the recording's, off their tracks for robots and back on them, at every physics step."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from socialnav_mj.cast import Cast, Replay, SlotCrowd
+from socialnav_mj.config import Scenario
+from socialnav_mj.geometry import Array
+from socialnav_mj.reaction import STRENGTH, Deviation, Movers, deviate
+from socialnav_mj.recordings import Recording
+
+
+class ReactingCrowd:
+    """A replay whose people decide at every control step how far they step off their tracks.
+
+    Between two control steps offset and drift go over into one another by the cubic that has both at both ends. Where
+    nobody deviates, the arrays are the replay's own.
+    """
+
+    def __init__(self, replay: Replay, scenario: Scenario) -> None:
+        """Everybody is on the track.
+
+        Args:
+            replay: What the recording says; it is not changed.
+            scenario: Gives the strength, the radii and the time steps.
+        """
+        self._replay = replay
+        self._strength = STRENGTH[scenario.pedestrians]
+        self._distance, self._body = scenario.contact_distance, 2.0 * scenario.pedestrian_radius
+        self._timestep, self._fine = scenario.control_timestep, scenario.physics_timestep
+        count = scenario.n_sub_steps
+        share = np.arange(count + 1)[:, None, None] / count
+        # Of the offset before, the drift before, the offset after, the drift after; then the same of the velocity.
+        self._place = (
+            (1.0 + 2.0 * share) * (1.0 - share) ** 2,
+            self._timestep * share * (1.0 - share) ** 2,
+            share * share * (3.0 - 2.0 * share),
+            self._timestep * share * share * (share - 1.0),
+        )
+        self._pace = (
+            6.0 * share * (share - 1.0) / self._timestep,
+            (1.0 - share) * (1.0 - 3.0 * share),
+            6.0 * share * (1.0 - share) / self._timestep,
+            share * (3.0 * share - 2.0),
+        )
+        self.begin()
+
+    def begin(self) -> None:
+        """Put everybody back on the track of the recording's beginning."""
+        people = self._replay.crowd(0)
+        self._step = 0
+        self._before = self._after = Deviation.none(len(people.pedestrian))
+        self._walk = np.zeros((len(people.pedestrian), 2))
+
+    def crowd(self, step: int) -> SlotCrowd:
+        """Everybody in the scene at a control step.
+
+        Args:
+            step: Of the last `react`, or the one after it; at others people are where the recording has them.
+
+        Returns:
+            As `Replay.crowd`, off the tracks.
+        """
+        recorded = self._replay.crowd(step)
+        if step == self._step:
+            deviation = self._before
+        elif step == self._step + 1:
+            deviation = self._stayed(self._after, recorded)
+        else:
+            return recorded
+        rows = deviation.rows
+        if not rows.size:
+            return recorded
+        position, velocity = recorded.position.copy(), recorded.velocity.copy()
+        position[rows] += deviation.offset[rows]
+        velocity[rows] += deviation.drift[rows]
+        return replace(recorded, position=position, velocity=velocity)
+
+    def react(self, step: int, people: SlotCrowd, robots: Movers) -> None:
+        """Decide how people walk in the control step that comes.
+
+        Args:
+            step: The control step, one after the last.
+            people: Where they are.
+            robots: That are under way.
+        """
+        now, then = self._replay.crowd(step), self._replay.crowd(step + 1)
+        if step != self._step:
+            self._before = self._stayed(self._after, now)
+            self._walk[now.changed] = 0.0
+        self._step, self._after = step, self._before
+        if not now.present.size or not (len(robots.position) or self._before.rows.size):
+            return
+        slots = now.present
+        w, z = now.quaternion[slots, 0], now.quaternion[slots, 3]
+        stays = now.pedestrian[slots] == then.pedestrian[slots]
+        after = deviate(
+            Deviation(offset=self._before.offset[slots], drift=self._before.drift[slots]),
+            people=Movers(position=people.position[slots], velocity=people.velocity[slots]),
+            recorded=Movers(position=now.position[slots], velocity=now.velocity[slots]),
+            following=np.where(stays[:, None], then.position[slots], np.nan),
+            facing=np.stack([w * w - z * z, 2.0 * w * z], axis=1),
+            robots=robots,
+            strength=self._strength,
+            timestep=self._timestep,
+            distance=self._distance,
+            body=self._body,
+        )
+        self._after = Deviation.none(len(now.pedestrian))
+        self._after.offset[slots], self._after.drift[slots] = after.offset, after.drift
+
+    def motion(self, step: int) -> tuple[Array, Array, Array | None]:
+        """How people move in the control step of the last `react`.
+
+        Args:
+            step: That control step.
+
+        Returns:
+            As `Replay.motion`, off the tracks.
+        """
+        position, velocity, walk = self._replay.motion(step)
+        rows = np.union1d(self._before.rows, self._after.rows)
+        last, self._walk = self._walk, np.zeros_like(self._walk)
+        if not rows.size:
+            return position, velocity, walk
+        known = (self._before.offset, self._before.drift, self._after.offset, self._after.drift)
+        ends = [values[rows] for values in known]
+        offset = sum(share * values for share, values in zip(self._place, ends, strict=True))
+        drift = sum(share * values for share, values in zip(self._pace, ends, strict=True))
+        position, velocity = position.copy(), velocity.copy()
+        position[:, rows] += offset[:-1]
+        velocity[:, rows] += drift[:-1]
+        if walk is not None:
+            steps = np.diff(offset, axis=0) / self._fine
+            walk = walk.copy()
+            walk[:, rows] += np.concatenate([last[rows][None], steps])
+            self._walk[rows] = steps[-1]
+        return position, velocity, walk
+
+    def _stayed(self, deviation: Deviation, people: SlotCrowd) -> Deviation:
+        """A deviation without that of people who have left; who comes is on the track."""
+        if not np.any(deviation.offset[people.changed]) and not np.any(deviation.drift[people.changed]):
+            return deviation
+        offset, drift = deviation.offset.copy(), deviation.drift.copy()
+        offset[people.changed], drift[people.changed] = 0.0, 0.0
+        return Deviation(offset=offset, drift=drift)
+
+
+def crowd_of(recording: Recording, scenario: Scenario, cast: Cast) -> Replay | ReactingCrowd:
+    """The people of an episode.
+
+    Args:
+        recording: Whose people they are.
+        scenario: Says whether they react, and how.
+        cast: Of both.
+
+    Returns:
+        The replay, or people who react.
+    """
+    replay = Replay(recording, scenario, cast)
+    return replay if scenario.pedestrians == "replay" else ReactingCrowd(replay, scenario)

@@ -1,0 +1,146 @@
+"""README.md of the plant study, and its verdict: what would a kinematic simulator have told wrongly?"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from socialnav_mj.report.intervals import ONE_RECORDING
+from socialnav_mj.report.markdown import interval, table
+from socialnav_mj.studies.cells import interval_cell, mean_cell
+from socialnav_mj.studies.conditions import Comparison
+from socialnav_mj.studies.files import traceability
+from socialnav_mj.studies.looks import SCENARIO_TITLES
+
+IDEAL = "unicycle"
+"""The condition that stands for a kinematic simulator."""
+JUDGED = {
+    "success": ("success", "", 3),
+    "intrusion_share_of_steps": ("the share of steps within 1.2 m", "", 3),
+    "time_under_way": ("the time", " s", 1),
+}
+"""Measure: how a verdict calls it, its unit, digits."""
+_HOW_TO_READ = f"""\
+Every controller drove the same agents among the same people on four plants: the default *wheels*; an ideal *unicycle* \
+that follows every command exactly, whatever it touches; a *heavy* base that accelerates with 1 m/s^2; and wheels on a \
+*slippery* floor (docs/simulation.md, "Plants"). *Difference*: minus wheels, paired by agent, with its 95 % interval. \
+*Verdict*: what of the unicycle's numbers lies off those of the wheels by more than its interval; every statement is \
+its own test at 95 %. *Tracking error*: between where a command leads and where the robot is a control step later. \
+*Not met*: share of control steps at whose end the robot is off the commanded twist by more than 0.1 m/s or 0.2 rad/s, \
+since its motors are at their limit, it slips, or it is held. {ONE_RECORDING}
+"""
+
+
+def verdict(own: Comparison, scenario: str, controller: str) -> list[str]:
+    """What a kinematic simulator tells wrongly of a controller.
+
+    Args:
+        own: Comparison of one recording; its first condition is what counts.
+        scenario: Name of a task.
+        controller: Of the comparison.
+
+    Returns:
+        A statement for each of `JUDGED` that the unicycle has otherwise; empty if there is none.
+    """
+    said = []
+    for measure, (name, unit, digits) in JUDGED.items():
+        gap = own.differences[scenario, controller, IDEAL, measure]
+        if gap.low > 0.0 or gap.high < 0.0:
+            way = "too high" if gap.mean > 0.0 else "too low"
+            ends = interval(abs(gap.mean), *sorted((abs(gap.low), abs(gap.high))), digits)
+            said.append(f"{name} {way} by {ends}{unit}")
+    return said
+
+
+def verdict_rows(found: Sequence[Comparison]) -> list[dict[str, Any]]:
+    """Every verdict as rows of a table.
+
+    Args:
+        found: One comparison for each recording.
+
+    Returns:
+        Column: value.
+    """
+    return [
+        {
+            "recording": own.recording,
+            "scenario": scenario,
+            "controller": controller,
+            "told_wrongly": "; ".join(verdict(own, scenario, controller)),
+        }
+        for own in found
+        for scenario in own.scenarios
+        for controller in own.controllers
+    ]
+
+
+def plant_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any]) -> str:
+    """Text of the study's README.md.
+
+    Args:
+        found: One comparison for each recording.
+        provenance: Command, experiment, recordings, runs.
+
+    Returns:
+        Markdown.
+    """
+    lines = ["# What physics changes", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ]
+    lines += ["## What would a kinematic simulator have told wrongly?", "", *_verdicts(found)]
+    lines += ["## Does the ranking hold?", "", *_ranking(found)]
+    for own in found:
+        lines += [f"## {own.recording}", "", f"![plants](figures/plants_{own.recording}.png)", ""]
+        for scenario in own.scenarios:
+            lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(own, scenario)]
+    return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
+
+
+def _verdicts(found: Sequence[Comparison]) -> list[str]:
+    rows = []
+    for controller in found[0].controllers:
+        for own in found:
+            told = {scenario: verdict(own, scenario, controller) for scenario in own.scenarios}
+            texts = [
+                f"{SCENARIO_TITLES.get(s, s).split(':')[0]}: {', '.join(said)}" for s, said in told.items() if said
+            ]
+            rows.append([controller, own.recording, "; ".join(texts) or "nothing that these draws show"])
+    return table(["controller", "recording", "told wrongly"], rows)
+
+
+def _ranking(found: Sequence[Comparison]) -> list[str]:
+    rows = [
+        [
+            own.recording,
+            SCENARIO_TITLES.get(scenario, scenario),
+            measure.replace("_", " "),
+            *(
+                interval(tau.mean, tau.low, tau.high, 2)
+                for other in own.conditions[1:]
+                for tau in (own.taus[scenario, other.name, measure],)
+            ),
+        ]
+        for own in found
+        for scenario in own.scenarios
+        for measure in dict.fromkeys(key[2] for key in own.taus)
+    ]
+    names = [condition.name for condition in found[0].conditions[1:]]
+    return table(["recording", "scenario", "ranked by", *(f"Kendall's tau, {name}" for name in names)], rows)
+
+
+def _scenario(own: Comparison, scenario: str) -> list[str]:
+    first, *others = own.conditions
+    rows = []
+    for name in own.controllers:
+        cells = [name, interval_cell(own.level(scenario, name, first, "success"))]
+        for other in others:
+            gap = own.differences[scenario, name, other.name, "success"]
+            cells.append(interval(gap.mean, gap.low, gap.high, 3, "+"))
+
+        def each(measure: str, digits: int, name: str = name) -> str:
+            levels = [own.level(scenario, name, condition, measure) for condition in own.conditions]
+            return " / ".join(mean_cell(level, digits) for level in levels)
+
+        cells += [each("time_under_way", 1), each("first_hit_pedestrian", 3), each("first_hit_agent", 3)]
+        cells += [each("tracking_error", 3), each("side_slip", 3), each("unmet_share", 3)]
+        rows.append([*cells, each("stopping_distance", 2)])
+    heads = ["controller", f"success, {first.name}", *(f"difference, {other.name}" for other in others)]
+    each_of = " / ".join(condition.name for condition in own.conditions)
+    heads += [f"time, censored [s]: {each_of}", "hit first by a pedestrian", "hit first by an agent"]
+    return table([*heads, "tracking error [m]", "side slip [m/s]", "commands not met", "stopping distance [m]"], rows)

@@ -1,0 +1,64 @@
+"""The reaction study: replay, weak and yielding people, and what becomes of the ranking."""
+
+from pathlib import Path
+
+from socialnav_mj.recordings import load_recording
+from socialnav_mj.studies.conditions import Condition, ConditionStudy, compare
+from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
+from socialnav_mj.studies.reaction.page import reaction_page
+from socialnav_mj.studies.slopes import draw_slopes
+from socialnav_mj.studies.study import read_runs
+
+LEVELS = (
+    Condition(name="replay", title="people keep to the recording"),
+    Condition(name="weak", title="people give way weakly", task_kwargs={"pedestrians": "weak"}),
+    Condition(name="yielding", title="people give way as to each other", task_kwargs={"pedestrians": "yielding"}),
+)
+RANKED = ("success", "intrusion_share_of_steps")
+"""Measures whose ranking of controllers is compared."""
+MEASURES = (
+    *RANKED,
+    "deviation_imposed",
+    "delay_imposed",
+    "time_under_way",
+    "first_hit_pedestrian",
+    "first_hit_agent",
+    "timed_out",
+)
+"""What is told of every controller and level."""
+PUBLIC = ("README.md", "provenance.json", "tables", "figures")
+"""What may travel with the project: no recordings, no episodes."""
+_SLOPES = (
+    ("success", "share that succeeds"),
+    ("intrusion_share_of_steps", "share of steps\nwithin 1.2 m"),
+    ("deviation_imposed", "imposed\ndeviation [m]"),
+    ("delay_imposed", "imposed\ndelay [s]"),
+)
+
+
+def write_reaction(study: ConditionStudy, out: Path, *, command: str, n_jobs: int = -1) -> Path:
+    """Make everything in the study's folder again, except its episodes.
+
+    Args:
+        study: That was run by `study.reproduce`; its conditions are `LEVELS`.
+        out: Its folder; gets tables/, figures/, README.md, report.html and provenance.json.
+        command: That made it.
+        n_jobs: Processes that score episodes.
+
+    Returns:
+        Path of README.md.
+
+    Raises:
+        FileNotFoundError: If a run has no episodes.
+        EpisodeError: If an episode is damaged or does not fit the others.
+    """
+    results = read_runs(study, out, n_jobs=n_jobs)
+    found = [compare(study, results, recording, MEASURES, RANKED) for recording in study.recordings]
+    write_csv(out / "tables" / "levels.csv", [row for own in found for row in own.level_rows()])
+    write_csv(out / "tables" / "differences.csv", [row for own in found for row in own.difference_rows()])
+    write_csv(out / "tables" / "ranking.csv", [row for own in found for row in own.tau_rows()])
+    for own in found:
+        draw_slopes(own, _SLOPES, out / "figures", f"slopes_{own.recording}")
+    recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
+    provenance = write_provenance(study, results, recordings, out, command=command)
+    return write_pages(out, reaction_page(found, provenance=provenance), results, command=command)

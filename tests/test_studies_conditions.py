@@ -1,0 +1,113 @@
+"""Studies of conditions: rank correlations by hand, and both commands on the smallest crowd."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from socialnav_mj.cli import main
+from socialnav_mj.config import Scenario
+from socialnav_mj.recordings import load_recording
+from socialnav_mj.report import style
+from socialnav_mj.studies.conditions import ConditionStudy, kendall
+from socialnav_mj.studies.plant.study import PLANTS
+from socialnav_mj.studies.reaction.people_as_robots import people_as_robots
+from socialnav_mj.studies.reaction.study import LEVELS
+
+TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
+
+
+def test_tau_of_clear_rankings_is_that_of_the_means_and_of_noise_wide():
+    random = np.random.default_rng(0)
+    clear = np.array([0.1, 0.3, 0.5, 0.9]) + random.normal(0.0, 0.001, (10, 4))
+    same = kendall(clear, clear + 0.2)
+    assert (same.mean, same.low, same.high) == (1.0, 1.0, 1.0)
+    assert kendall(clear, -clear).mean == -1.0
+    # 3 of 6 pairs change over if the last becomes the first: tau = (3 - 3) / 6.
+    assert kendall(clear, clear[:, [3, 0, 1, 2]]).mean == pytest.approx(0.0)
+    noise = kendall(random.normal(size=(10, 4)), random.normal(size=(10, 4)))
+    assert noise.high - noise.low > 0.5
+    few = kendall(clear[:2], clear[:2])
+    assert few.mean == 1.0 and np.isnan(few.low)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"recordings": ()}, r"recordings = \(\) is not allowed"),
+        ({"controllers": ("orca",)}, "two or more, each once"),
+    ],
+)
+def test_impossible_studies_are_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        ConditionStudy(**{"recordings": (TINY,), "conditions": LEVELS, **changes})
+
+
+@pytest.mark.parametrize("conditions", [LEVELS, PLANTS])
+def test_first_condition_is_the_default_setting_and_all_others_are_allowed(conditions):
+    scenarios = [Scenario().changed(**condition.task_kwargs) for condition in conditions]
+    assert scenarios[0] == Scenario() and len({str(s.as_dict()) for s in scenarios}) == len(conditions)
+
+
+@pytest.mark.parametrize(("name", "conditions"), [("reaction", LEVELS), ("plant", PLANTS)])
+def test_command_runs_resumes_and_publishes_no_episode(name, conditions, tmp_path, capsys):
+    out, public = tmp_path / "out", tmp_path / "results"
+    command = [name, "--recordings", TINY, "--scenarios", "1", "4", "--draws", "3", "--jobs", "1"]
+    command += ["--controllers", "go_straight", "--also", "social_force"]
+    main([*command, "--out", str(out), "--publish", str(public)])
+    assert "report:" in capsys.readouterr().out
+    assert sorted(path.name for path in public.iterdir()) == ["README.md", "figures", "provenance.json", "tables"]
+    rows = list(csv.DictReader((public / "tables" / "levels.csv").open()))
+    assert {row["condition"] for row in rows} == {condition.name for condition in conditions}
+    assert {row["controller"] for row in rows} == {"go_straight", "social_force"}
+    changes = list(csv.DictReader((public / "tables" / "differences.csv").open()))
+    # A difference of paired means is the difference of the means where every agent has both values.
+    mean = {(r["scenario"], r["controller"], r["condition"], r["measure"]): float(r["mean"] or "nan") for r in rows}
+    for row in changes:
+        if row["measure"] == "success":
+            first, other = (
+                mean[row["scenario"], row["controller"], condition, "success"]
+                for condition in (conditions[0].name, row["condition"])
+            )
+            assert float(row["difference"]) == pytest.approx(other - first, abs=1e-5)
+    page = (public / "README.md").read_text()
+    for text in ("scenario 4: 90 % agents", "## Does the ranking hold?", "Kendall's tau", "| social_force | "):
+        assert text in page
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")}
+    assert len(before) == 2 * 3 * 3 * len(conditions)
+    main([*command, "--out", str(out)])
+    assert {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")} == before
+
+
+def test_ideal_plant_tracks_and_real_ones_do_not_in_the_studys_table(tmp_path):
+    out = tmp_path / "out"
+    command = ["plant", "--recordings", TINY, "--scenarios", "1", "--draws", "1", "--jobs", "1", "--out", str(out)]
+    main([*command, "--controllers", "go_straight", "social_force"])
+    rows = csv.DictReader((out / "tables" / "levels.csv").open())
+    error = {r["condition"]: float(r["mean"]) for r in rows if r["measure"] == "tracking_error"}
+    assert error["unicycle"] < 1e-9 < error["wheels"] < error["heavy"]
+
+
+def test_people_as_robots_move_nobody_at_strength_0_and_somebody_at_a_great_one():
+    recording = load_recording(TINY)
+    still, moved = people_as_robots(recording, 0.0)
+    assert (still.mean_displacement, still.ks_speed, still.ks_nearest) == (0.0, 0.0, 0.0)
+    assert still.touches == still.touches_recorded and not moved.any()
+    strong = [people_as_robots(recording, 50.0, late=late)[0] for late in (0.0, 1.0)]
+    assert all(outcome.tracks == still.tracks for outcome in strong)
+
+
+def test_people_as_robots_command_writes_a_table_and_a_figure(tmp_path, capsys):
+    out = tmp_path / "test"
+    main(["people-as-robots", "--recordings", TINY, "--late", "1.0", "--out", str(out)])
+    assert "k = 1.5 (yielding), on time" in capsys.readouterr().out
+    rows = list(csv.DictReader((out / "tables" / "people_as_robots.csv").open()))
+    assert len(rows) == 2 * 2 and (out / "figures" / "displacement.png").is_file()
+    with pytest.raises(SystemExit):
+        main(["people-as-robots", "--recordings", TINY, "--late", "0.0", "--out", str(out)])
