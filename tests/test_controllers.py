@@ -393,6 +393,7 @@ def misbehaving(**members):
         ({"act": lambda self, o: np.random.default_rng().random((len(o["active"]), 2))}, "something else"),
         ({"policies": ("a", "b"), "active_policy": 1}, r"active_policy is 1; expected shape \(4,\)"),
         ({"active_policy": property(lambda self: np.full(4, 5))}, "indices into"),
+        ({"policies": ("a", "b"), "scores": np.zeros(2)}, r"scores is \[0. 0.\]; expected shape \(4, 2\), finite"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")

@@ -150,6 +150,7 @@ def test_options_in_the_text_are_those_of_a_command(capsys):
         ["fit-prediction"],
         ["train", "replay-irl"],
         ["train", "attention"],
+        ["fit-selector"],
         ["data", "list"],
         ["data", "info"],
         ["data", "fetch"],

@@ -15,6 +15,7 @@ from socialnav_mj.cli.console import errors, say
 from socialnav_mj.cli.cost import Bench, StepSize
 from socialnav_mj.cli.learning import Ship, Train
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
+from socialnav_mj.cli.selection import FitSelector
 from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce
 from socialnav_mj.cli.view import Render, View
 from socialnav_mj.processes import stoppable
@@ -33,6 +34,7 @@ Command = (
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Ship, tyro.conf.subcommand("ship")]
     | Annotated[FitPrediction, tyro.conf.subcommand("fit-prediction")]
+    | Annotated[FitSelector, tyro.conf.subcommand("fit-selector")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[LeaveOneOut, tyro.conf.subcommand("leave-one-out")]
     | Annotated[Gains, tyro.conf.subcommand("gains")]

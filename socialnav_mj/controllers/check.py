@@ -94,6 +94,12 @@ def _checked_action(controller: Controller, scene: str, observation: Observation
         raise ProtocolError(
             f"in the {scene} scene, active_policy is {policy}; expected shape {shape[:1]} with indices into {policies}"
         )
+    scores = getattr(controller, "scores", None)
+    expected = (*shape[:1], len(policies))
+    if scores is not None and (np.shape(scores) != expected or not np.isfinite(np.asarray(scores)[active]).all()):
+        raise ProtocolError(
+            f"in the {scene} scene, scores is {scores}; expected shape {expected}, finite for active agents"
+        )
     action[~active] = 0.0
     return action
 

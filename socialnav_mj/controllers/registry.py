@@ -16,6 +16,7 @@ from socialnav_mj.controllers.go_straight import GoStraight
 from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.identity import json_value, parameters_of
 from socialnav_mj.controllers.irl_mpc import IRLMPC
+from socialnav_mj.controllers.learned_selector import LearnedSelector
 from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.mpdm import MPDM
 from socialnav_mj.controllers.mppi import MPPI
@@ -44,6 +45,7 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "mpc": MPC,
     "mppi": MPPI,
     "irl_mpc": IRLMPC,
+    "learned_selector": LearnedSelector,
 }
 
 
