@@ -18,7 +18,8 @@ from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.situation import NAMES, situation
 from socialnav_mj.controllers.stand_still import StandStill
 from socialnav_mj.features import View, view_of
-from socialnav_mj.learning.selection import COLLISION_COST, HOLD, NEARNESS_COST, Trials, fit, left_out, outcomes
+from socialnav_mj.learning.selection import fit, left_out
+from socialnav_mj.learning.trials import COLLISION_COST, HOLD, NEARNESS_COST, Trials, outcomes
 from socialnav_mj.rollout import rollout
 
 

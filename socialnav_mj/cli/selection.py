@@ -34,7 +34,7 @@ class FitSelector:
 
     def run(self) -> None:
         """Make the trials that are missing, fit, and say where the weights are."""
-        import tasks
+        from socialnav_mj import suite
         from socialnav_mj.learning.selection import train_selector
 
         out = self.out or Path("runs") / "selector" / Path(self.dataset).stem
@@ -43,7 +43,7 @@ class FitSelector:
                 out,
                 self.candidates,
                 dataset=self.dataset,
-                shares=[tasks.SHARES[f"scenario_{number}"] for number in self.scenarios],
+                shares=[suite.SHARES[f"scenario_{number}"] for number in self.scenarios],
                 draws=self.draws,
                 data_dir=None if self.data_dir is None else str(self.data_dir),
                 progress=say,

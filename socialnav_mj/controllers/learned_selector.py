@@ -117,7 +117,7 @@ class LearnedSelector(SwitchingController):
     """Lets the policy act that is expected to cost least if it acts for the next 2.4 s.
 
     What each costs was learned from trials: in real episodes a policy drawn at random acted for 2.4 s, again and again,
-    and what came of it was regressed on the situation (`socialnav_mj.learning.selection`).
+    and what came of it was regressed on the situation (`socialnav_mj.learning.trials`).
     """
 
     candidates: tuple[TwistController, ...] = field(default_factory=default_candidates, metadata={IS_CONTROLLER: True})
