@@ -1,6 +1,7 @@
 """People who react: the recording's, off their tracks for robots and back on them, at every physics step."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -126,8 +127,8 @@ class ReactingCrowd:
             return position, velocity, walk
         known = (self._before.offset, self._before.drift, self._after.offset, self._after.drift)
         ends = [values[rows] for values in known]
-        offset = sum(share * values for share, values in zip(self._place, ends, strict=True))
-        drift = sum(share * values for share, values in zip(self._pace, ends, strict=True))
+        offset: Any = sum(share * values for share, values in zip(self._place, ends, strict=True))
+        drift: Any = sum(share * values for share, values in zip(self._pace, ends, strict=True))
         position, velocity = position.copy(), velocity.copy()
         position[:, rows] += offset[:-1]
         velocity[:, rows] += drift[:-1]

@@ -45,8 +45,8 @@ def tracking_error(episode: Episode) -> Array:
     error = np.full(episode.agent_heading.shape, np.nan)
     time = np.full((1, 1), episode.control_timestep)
     shape = twist.shape[:2]
-    start = episode.agent_position[:-1].reshape(-1, 2), episode.agent_heading[:-1].reshape(-1)
-    there, _ = arc(*(np.nan_to_num(values) for values in start), np.nan_to_num(twist).reshape(-1, 2), time)
+    position, heading = episode.agent_position[:-1].reshape(-1, 2), episode.agent_heading[:-1].reshape(-1)
+    there, _ = arc(np.nan_to_num(position), np.nan_to_num(heading), np.nan_to_num(twist).reshape(-1, 2), time)
     error[:-1] = np.linalg.norm(episode.agent_position[1:] - there.reshape(*shape, 2), axis=-1)
     commanded = np.isfinite(episode.agent_wheel_speed[..., 0])
     return mean_over(error, commanded & np.isfinite(error))

@@ -45,7 +45,8 @@ def verdict(own: Comparison, scenario: str, controller: str) -> list[str]:
         gap = own.differences[scenario, controller, IDEAL, measure]
         if gap.low > 0.0 or gap.high < 0.0:
             way = "too high" if gap.mean > 0.0 else "too low"
-            ends = interval(abs(gap.mean), *sorted((abs(gap.low), abs(gap.high))), digits)
+            low, high = sorted((abs(gap.low), abs(gap.high)))
+            ends = interval(abs(gap.mean), low, high, digits)
             said.append(f"{name} {way} by {ends}{unit}")
     return said
 
