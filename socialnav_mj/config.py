@@ -59,7 +59,12 @@ class Robot:
     max_speed: float = 1.0
     """Largest forward speed; there is no reverse (paper section III-B) [m/s]."""
 
+    max_yaw_rate: float | None = None
+    """Largest yaw rate of its own drive, besides the turn limit; by default only that counts [rad/s]."""
+
     def __post_init__(self) -> None:
+        if self.max_yaw_rate is not None:
+            _require_number(self.max_yaw_rate, "Robot.max_yaw_rate", "numbers > 0", lambda value: value > 0.0)
         for name in ("wheel_radius", "track"):
             _require_number(getattr(self, name), f"Robot.{name}", "numbers > 0", lambda value: value > 0.0)
         _require_within(self.radius, "Robot.radius", *ROBOT_RADII)
@@ -182,8 +187,9 @@ class Scenario:
 
     @property
     def max_yaw_rate(self) -> float:
-        """Largest yaw rate that the turn limit allows [rad/s]."""
-        return pi / 6.0 / (self.control_timestep if self.turn_limit == "per_step" else 1.0)
+        """Largest yaw rate that the turn limit and the robot's drive allow [rad/s]."""
+        limit = pi / 6.0 / (self.control_timestep if self.turn_limit == "per_step" else 1.0)
+        return limit if self.robot.max_yaw_rate is None else min(limit, self.robot.max_yaw_rate)
 
     @property
     def contact_distance(self) -> float:

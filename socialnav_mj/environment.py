@@ -13,6 +13,7 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.episode import IntArray
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording, load_recording
+from socialnav_mj.robot_files import robot_settings
 from socialnav_mj.scene import build_model
 from socialnav_mj.task import CrowdTask
 
@@ -35,6 +36,7 @@ def make_environment(
     dataset: str | Path | Recording = "plaza",
     variant: str | None = None,
     data_dir: str | Path | None = None,
+    robot: str | Path | None = None,
     time_limit: float = float("inf"),
     random: int | np.random.RandomState | None = None,
     environment_kwargs: dict[str, Any] | None = None,
@@ -47,6 +49,8 @@ def make_environment(
         dataset: Name in the catalogue, path of a recording, or a recording.
         variant: Which annotation of the recording; None is the default one.
         data_dir: Where recordings are looked for first; None means SOCIALNAV_MJ_DATA, then the user cache.
+        robot: Name of a shipped robot, or path of an MJCF file with its limits in a TOML beside it; None for that of
+            the settings.
         time_limit: The episode is cut after this time; by default it ends when the last agent's run has [s].
         random: An integer is another name for the setting `seed`. A generator is kept by the task, which draws nothing.
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
@@ -68,7 +72,8 @@ def make_environment(
         changes["seed"] = random
     if not (isinstance(time_limit, Real) and time_limit > 0.0):
         raise ValueError(f"time_limit = {time_limit!r} is not allowed; allowed: numbers > 0")
-    scenario = (scenario or Scenario()).changed(**changes)
+    of_robot = {} if robot is None else robot_settings(robot)
+    scenario = (scenario or Scenario()).changed(**{**of_robot, **changes})
     recording = (
         dataset if isinstance(dataset, Recording) else load_recording(dataset, variant=variant, data_dir=data_dir)
     )

@@ -27,6 +27,8 @@ class Trust:
 
     controllers: tuple[str, ...] = ()
     """Classes that may be imported and run, as "package.module:Class"."""
+    metrics: tuple[str, ...] = ()
+    """Own metrics that may be imported and run, as "package.module:function"."""
     robots: tuple[Path, ...] = ()
     """MJCF files outside of the assets."""
 

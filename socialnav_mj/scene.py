@@ -9,6 +9,7 @@ import numpy as np
 from socialnav_mj.config import Robot, Scenario
 from socialnav_mj.geometry import Array
 from socialnav_mj.resources import assets_folder
+from socialnav_mj.robot_files import read_robot
 
 AGENT_PREFIX = "agent_"
 PEDESTRIAN_PREFIX = "pedestrian_"
@@ -82,7 +83,7 @@ def build_model(
     _aim_cameras(arena, low=low, high=high)
 
     for slot in range(n_agent_slots if n_robots is None else n_robots):
-        robot = mujoco.MjSpec.from_file(str(_robot_file(scenario.robot, assets)))
+        robot = robot_spec(_robot_file(scenario.robot, assets), scenario.robot)
         robot.geom("bumper").size[0] = scenario.robot.radius
         if scenario.floor_friction is not None:
             for wheel in ("left_wheel", "right_wheel"):
@@ -136,6 +137,52 @@ def _robot_file(robot: Robot, assets: Path) -> Path:
     if not path.is_file():
         raise FileNotFoundError(f"Robot.model = {robot.model!r}: there is no file {path}")
     return path
+
+
+def robot_spec(path: Path, robot: Robot) -> mujoco.MjSpec:
+    """Read the model of a robot, with the names and servos that its TOML says, if there is one beside it.
+
+    Args:
+        path: Of the MJCF file.
+        robot: Its dimensions, by which servos are made.
+
+    Returns:
+        A model whose parts go by our names.
+
+    Raises:
+        ValueError: If the model has no such part.
+    """
+    spec = mujoco.MjSpec.from_file(str(path))
+    if not path.with_suffix(".toml").is_file():
+        return spec
+    file = read_robot(path)
+    for part, name in file.names.items():
+        found = {"robot": spec.body, "bumper": spec.geom}.get(part, spec.joint)(name)
+        if found is None:
+            raise ValueError(f"{path}: there is no {part} named {name!r}, as {path.with_suffix('.toml').name} says")
+        found.name = part
+        if part == "robot":
+            for joint in found.joints:
+                joint.name = "root"  # the free joint; a robot has no other one there
+        if part.endswith("wheel"):
+            found.parent.geoms[0].name = part
+    if file.drive:
+        for actuator in spec.actuators:
+            spec.delete(actuator)
+        turn = robot.wheel_radius / robot.track
+        for name, coefficients, gain, most in (
+            ("forward", (0.5 * robot.wheel_radius,) * 2, file.drive["forward_gain"], file.drive["forward_force"]),
+            ("yaw", (-turn, turn), file.drive["yaw_gain"], file.drive["yaw_torque"]),
+        ):
+            tendon = spec.add_tendon(name=name)
+            for wheel, coefficient in zip(("left_wheel", "right_wheel"), coefficients, strict=True):
+                tendon.wrap_joint(wheel, coefficient)
+            servo = spec.add_actuator(
+                name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON, forcerange=[-most, most], forcelimited=True
+            )
+            servo.set_to_velocity(kv=gain)
+            servo.ctrllimited = True
+    return spec
 
 
 def _check_robot(model: mujoco.MjModel, robot: Robot) -> None:

@@ -15,6 +15,7 @@ from socialnav_mj.files import finished_files
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import differences, package_versions, platform_facts
 from socialnav_mj.recordings import DEFAULT_READING, Reading
+from socialnav_mj.report.own_metrics import is_offered
 from socialnav_mj.report.run_file import RUN_FILE, read_run_file
 from socialnav_mj.report.writer import report_tables
 from socialnav_mj.resimulation import Trust, resimulate
@@ -95,7 +96,7 @@ def verify(
     yield from in_processes(_verify, arguments, n_jobs=n_jobs)
     if path.is_dir():
         yield _count(path)
-        yield from _tables(path, n_jobs)
+        yield from _tables(path, trust, n_jobs)
 
 
 def _verify(path: Path, dataset: str | None, data_dir: str | None, trust: Trust, bounds: Reading) -> Verdict:
@@ -184,10 +185,16 @@ def _count(folder: Path) -> Verdict:
     return Verdict(path=path, differences=tuple(differences))
 
 
-def _tables(folder: Path, n_jobs: int) -> Iterator[Verdict]:
+def _tables(folder: Path, trust: Trust, n_jobs: int) -> Iterator[Verdict]:
     """Whether the tables of a folder, if it has any, are those that its episodes give."""
     try:
-        expected = report_tables(folder, n_jobs=n_jobs)
+        run = read_run_file(folder / RUN_FILE)
+        metrics = () if run is None else run.metrics
+        if untrusted := [name for name in metrics if name not in trust.metrics and not is_offered(name)]:
+            error = f"its tables hold the metric {untrusted[0]!r}, whose code would run; if you trust it, add "
+            yield Verdict(path=folder / "report.md", error=f"{error}--trust {untrusted[0]}")
+            return
+        expected = report_tables(folder, metrics=metrics, n_jobs=n_jobs)
     except (ValueError, OSError) as error:
         yield Verdict(path=folder / "report.md", error=f"{type(error).__name__}: {error}")
         return

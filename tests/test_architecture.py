@@ -17,7 +17,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 # `episode` stands above the simulator although it is filled after it: it is a record of numpy arrays, and physics and
 # task share its Outcome and Partner.
 ROWS = (
-    {"resources", "elementary", "geometry", "config", "files", "processes", "slots"},
+    {"resources", "elementary", "geometry", "config", "files", "processes", "slots", "robot_files"},
     {"recordings"},
     {"contact", "outcome", "episode_checks", "episode_file", "observation", "episode", "features", "provenance"},
     {
@@ -44,7 +44,7 @@ ROWS = (
     {"controllers"},
     {"recorder", "rollout", "human", "resumption", "evaluation"},
     {"metrics"},
-    {"trace", "film"},
+    {"trace", "film", "export"},
     {"report"},
     {"envs"},
     {"learning"},

@@ -308,6 +308,31 @@ def test_killed_command_leaves_no_process_and_no_file_changes_any_more():
     assert {path.name: path.stat().st_mtime_ns for path in Path("o/episodes").iterdir()} == left
 
 
+def test_json_gives_one_object_and_quiet_only_errors(capsys):
+    main(["list", "--json"])
+    out = json.loads(capsys.readouterr().out)
+    controllers = next(table for table in out["tables"] if table["title"] == "controllers")
+    assert {"controller": "go_straight", "settings and their defaults": "none"} in controllers["rows"]
+    main([*QUICK, "--controllers", "go_straight", "--out", "o", "--json", "--quiet"])
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    found = json.loads(shown.out)
+    names = {(e["controller"], e["measure"]) for e in found["estimates"]}
+    assert ("go_straight", "success") in names and found["lines"][0] == "report: o/report.md"
+    main(["verify", "o", "--dataset", TINY, "--jobs", "1", "--json", "--quiet"])
+    assert all(file["same"] for file in json.loads(capsys.readouterr().out)["files"])
+    main(["list"])
+    assert capsys.readouterr().out.startswith("tasks")
+    assert "no episodes in" in fails(capsys, "report", "nowhere", "--quiet")
+
+
+def test_output_that_is_no_terminal_has_no_colours(capsys):
+    main(["list"])
+    main(["check", "go_straight"])
+    told = capsys.readouterr().out + fails(capsys, "report", "nowhere")
+    assert "\x1b" not in told
+
+
 SPIN = """
 class Spin:
     name = "spin"

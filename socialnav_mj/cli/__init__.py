@@ -1,5 +1,6 @@
 """The command `socialnav-mj`: sub-commands, and nothing that another module could do."""
 
+import logging
 import signal
 import sys
 from importlib.metadata import version
@@ -11,8 +12,10 @@ from dm_control.rl.control import PhysicsError
 
 from socialnav_mj.cli.board import Leaderboard, PeopleAsRobots, Plant, Reaction
 from socialnav_mj.cli.catalogue import Data, List
-from socialnav_mj.cli.console import errors, say
+from socialnav_mj.cli.console import console, errors, failures, say
+from socialnav_mj.cli.controllers import Check
 from socialnav_mj.cli.cost import Bench, StepSize
+from socialnav_mj.cli.exports import Export
 from socialnav_mj.cli.learning import Ship, Train
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
 from socialnav_mj.cli.selection import FitSelector
@@ -25,7 +28,9 @@ Command = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Render, tyro.conf.subcommand("render")]
+    | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Verify, tyro.conf.subcommand("verify")]
+    | Annotated[Check, tyro.conf.subcommand("check")]
     | Annotated[Draws, tyro.conf.subcommand("draws")]
     | Annotated[List, tyro.conf.subcommand("list")]
     | Annotated[Data, tyro.conf.subcommand("data")]
@@ -48,29 +53,39 @@ Command = (
 def main(args: list[str] | None = None) -> None:
     """Entry point; bad input ends in one clear message and exit code 2, an interruption in 128 + the signal's number.
 
+    1 means that `verify` or `check` found something. `--json` and `--quiet` may stand anywhere.
+
     These are 130 for Ctrl-C, 143 for SIGTERM and 129 for SIGHUP.
 
     Args:
         args: Command line without the program's name; sys.argv by default.
     """
-    if (sys.argv[1:] if args is None else args) == ["--version"]:
+    given = sys.argv[1:] if args is None else args
+    if given == ["--version"]:
         say(f"socialnav-mj {version('socialnav-mj')}")
         return
+    console.begin(as_json="--json" in given)
+    errors.quiet = "--quiet" in given
+    logging.disable(logging.WARNING if errors.quiet else logging.NOTSET)
     command = tyro.cli(
         Command,
         prog="socialnav-mj",
-        description="Social navigation in recorded crowds, as a MuJoCo physics benchmark. --version tells the version.",
-        args=args,
+        description="Social navigation in recorded crowds, as a MuJoCo physics benchmark. With every command: --json "
+        "prints results as one JSON object, --quiet hides progress and notes. --version tells the version.",
+        args=[word for word in given if word not in ("--json", "--quiet")],
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
     )
     # As `python -m` does, so that package.module:Class finds what lies here; last, so that it hides nothing.
     sys.path.append(str(Path.cwd()))
     try:
         with stoppable():
-            command.run()
+            try:
+                command.run()
+            finally:
+                console.finish()
     except KeyboardInterrupt as stop:
-        say("interrupted; repeat the command to resume", errors)
+        say("interrupted; repeat the command to resume", failures)
         sys.exit(128 + getattr(stop, "number", signal.SIGINT))
     except (ValueError, OSError, RuntimeError, PhysicsError) as error:
-        say(f"error: {error}", errors, style="red")
+        say(f"error: {error}", failures, style="red")
         sys.exit(2)

@@ -1,7 +1,8 @@
 """What the commands say: results to stdout, everything else to stderr."""
 
+import json
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import (
@@ -14,7 +15,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Column
+from rich.table import Column, Table
 from rich.text import Text
 
 if TYPE_CHECKING:
@@ -23,8 +24,65 @@ if TYPE_CHECKING:
     from socialnav_mj.cli.pace import Pace
     from socialnav_mj.evaluation import Done, Job
 
-console = Console()
+
+class Results(Console):
+    """Stdout: text for people or, after `--json`, one JSON object at the end."""
+
+    as_json = False
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Show something, or keep it for the JSON object: lines of text, and tables with their cells as text.
+
+        Args:
+            *objects: As rich takes them.
+            **options: As rich takes them.
+        """
+        if not self.as_json:
+            super().print(*objects, **options)
+            return
+        for shown in objects:
+            if isinstance(shown, Table):
+                self._kept.setdefault("tables", []).append(_table_json(shown))
+            elif isinstance(shown, str | Text):
+                self._kept.setdefault("lines", []).extend(str(shown).splitlines())
+
+    def tell(self, **values: Any) -> None:
+        """Values for the JSON object alone.
+
+        Args:
+            **values: JSON values.
+        """
+        self._kept.update(values)
+
+    def begin(self, *, as_json: bool) -> None:
+        """Forget what was kept.
+
+        Args:
+            as_json: Whether an object is wanted at the end.
+        """
+        self.as_json = as_json
+        self._kept: dict[str, Any] = {}
+
+    def finish(self) -> None:
+        """Print the object, if one is wanted."""
+        if self.as_json:
+            self.as_json = False
+            self.file.write(json.dumps(self._kept, indent=1, default=str) + "\n")
+
+
+def _table_json(table: Table) -> dict[str, Any]:
+    headings = [str(column.header) for column in table.columns]
+    cells = ([str(cell) for cell in column.cells] for column in table.columns)
+    rows = [dict(zip(headings, row, strict=True)) for row in zip(*cells, strict=True)]
+    return {"title": str(table.title or ""), "rows": rows}
+
+
+console = Results()
+console.begin(as_json=False)
 errors = Console(stderr=True)
+"""Progress and notes; `--quiet` silences it."""
+failures = Console(stderr=True)
+"""Why a command ends without its result."""
 
 
 def say(text: str, console: Console = console, style: str = "") -> None:
@@ -70,4 +128,4 @@ def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
             pace.note(done)
             progress.update(bar, advance=1)
             if done.error is not None:
-                say(f"{done.job.file_name}: {done.error}", progress.console, style="red")
+                say(f"{done.job.file_name}: {done.error}", failures if errors.quiet else progress.console, style="red")

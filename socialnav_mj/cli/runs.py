@@ -46,6 +46,10 @@ class Evaluate:
     """Random choices of the replaced people; 10 or more for figures to publish."""
     seed: int = 0
     """Number of the first draw; the others count up from it. Draws below 100 are for choosing, others for reporting."""
+    robot: Name = None
+    """Robot: turtlebot4, jackal, or the path of an MJCF file with its limits in a TOML beside it."""
+    metrics: tuple[str, ...] = ()
+    """Own metrics that the tables get too: package.module:function of an Episode that gives a number for each agent."""
     jobs: int = -1
     """Processes; -1 for one a core."""
     out: Folder = None
@@ -63,11 +67,14 @@ class Evaluate:
         from socialnav_mj.controllers import with_policy_of
         from socialnav_mj.controllers.specs import with_trust
         from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of, recording_of
+        from socialnav_mj.report.own_metrics import own_metrics
         from socialnav_mj.report.writer import write_report
         from socialnav_mj.resumption import ChangedError
+        from socialnav_mj.robot_files import robot_settings
 
         if self.again and self.keep:
             raise ValueError("--again and --keep are both given; give one")
+        own = [metric.name for metric in own_metrics(self.metrics)]
         evaluation = Evaluation(
             dataset=self.dataset,
             variant=self.variant,
@@ -77,7 +84,7 @@ class Evaluate:
             controllers=tuple(with_trust(with_policy_of(spec, self.dataset), self.trust) for spec in self.controllers),
             draws=self.draws,
             seed=self.seed,
-            task_kwargs=changes(self.settings),
+            task_kwargs=({} if self.robot is None else robot_settings(self.robot)) | changes(self.settings),
         )
         out = self.out or Path("runs") / Path(self.dataset).resolve().stem
         say(describe(recording_of(evaluation)), errors)
@@ -88,8 +95,8 @@ class Evaluate:
             raise ValueError(f"{error.told}; --again runs them anew, --keep keeps both") from error
         follow(episodes, jobs_of(evaluation))
         with errors.status("tables and traces"):
-            report = write_report(out, n_jobs=self.jobs)
-        show(report.estimates)
+            report = write_report(out, metrics=self.metrics, n_jobs=self.jobs)
+        show(report.estimates, own)
         say(_told_where(report.page, out))
 
 
@@ -102,16 +109,20 @@ class Report:
     dialect: tuple[str, ...] = ()
     """Other benchmarks (paper, socnavbench, hunavsim, francis2023, crowdnav): tables/dialect_NAME.csv tells the metrics
     as they define them, see docs/metrics.md."""
+    metrics: tuple[str, ...] = ()
+    """Own metrics that the tables get too: package.module:function."""
     jobs: int = -1
     """Processes; -1 for one a core."""
 
     def run(self) -> None:
         """Write everything that is computed from the episodes, and print the main columns."""
         from socialnav_mj.cli.terminal import show
+        from socialnav_mj.report.own_metrics import own_metrics
         from socialnav_mj.report.writer import write_report
 
-        report = write_report(self.folder, dialects=self.dialect, n_jobs=self.jobs)
-        show(report.estimates)
+        own = [metric.name for metric in own_metrics(self.metrics)]
+        report = write_report(self.folder, dialects=self.dialect, metrics=self.metrics, n_jobs=self.jobs)
+        show(report.estimates, own)
         say(_told_where(report.page, self.folder))
 
 
@@ -130,8 +141,8 @@ class Verify:
     data_dir: Folder = None
     """Where recordings are looked for first."""
     trust: tuple[str, ...] = ()
-    """package.module:Class or sb3:policy.zip that the files may have run; importing them runs their code. Built-in
-    controllers and those of installed packages need none."""
+    """package.module:Class or sb3:policy.zip that the files may have run, package.module:function of own metrics in
+    tables; importing them runs their code. Built-in ones and those of installed packages need none."""
     trust_robot: tuple[Path, ...] = ()
     """MJCF files of robots, outside of the package's assets, that the files may name."""
     max_duration: float = Reading.max_duration
@@ -147,9 +158,10 @@ class Verify:
         from socialnav_mj.verification import files_of, verify
 
         data_dir = None if self.data_dir is None else str(self.data_dir)
-        trust = Trust(controllers=self.trust, robots=self.trust_robot)
+        trust = Trust(controllers=self.trust, metrics=self.trust, robots=self.trust_robot)
         bounds = Reading(max_duration=self.max_duration, max_gap=self.max_gap)
         checked, wrong = 0, 0
+        files = []
         with counted_progress() as progress:
             bar = progress.add_task("files", total=len(files_of(self.path)))
             for verdict in verify(
@@ -158,6 +170,9 @@ class Verify:
                 progress.advance(bar)
                 checked, wrong = checked + 1, wrong + (not verdict.same)
                 say(f"{verdict.path.name}: {_told(verdict)}")
+                told = {"differences": verdict.differences, "error": verdict.error}
+                files.append({"file": verdict.path.name, "same": verdict.same, **told})
+        console.tell(files=files)
         say(f"{checked - wrong} of {checked} files say what their re-simulation says")
         if wrong:
             sys.exit(1)

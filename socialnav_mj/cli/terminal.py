@@ -1,6 +1,8 @@
 """Results of a run as tables for a terminal."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 from rich import box
 from rich.table import Table
@@ -10,6 +12,7 @@ from socialnav_mj.cli.console import console
 from socialnav_mj.recordings.known import crowd_of
 from socialnav_mj.report import columns as col
 from socialnav_mj.report.estimates import MEASURES, Estimate
+from socialnav_mj.report.markdown import bounds
 from socialnav_mj.report.page import by_scenario, with_error
 
 _COLUMNS = (
@@ -54,11 +57,39 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
     return tables
 
 
-def show(estimates: Sequence[Estimate]) -> None:
+def own_table(estimates: Sequence[Estimate], own: Sequence[str]) -> Table:
+    """Means and intervals of the user's own metrics.
+
+    Args:
+        estimates: See `terminal_tables`.
+        own: Names of their measures.
+
+    Returns:
+        A row for each scenario, controller and metric.
+    """
+    table = Table(title="own metrics", box=box.SIMPLE_HEAD, padding=0)
+    for heading in ("scenario", "controller", "metric", "mean", "95 % interval"):
+        table.add_column(heading, overflow="fold")
+    for e in estimates:
+        if e.measure in own:
+            texts = (e.scenario, e.controller, e.measure, f"{e.mean:.3g}", bounds(e.low, e.high))
+            table.add_row(*map(Text, texts))
+    return table
+
+
+def _without_nan(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: None if value != value else value for key, value in values.items()}
+
+
+def show(estimates: Sequence[Estimate], own: Sequence[str] = ()) -> None:
     """Print `terminal_tables` to stdout.
 
     Args:
         estimates: Of the measures of one run, as `estimates.summarise` returns them.
+        own: Names of the user's own measures, which get a table of their own.
     """
+    console.tell(estimates=[_without_nan(asdict(estimate)) for estimate in estimates])
     for table in terminal_tables(estimates):
         console.print(table)
+    if own:
+        console.print(own_table(estimates, own))

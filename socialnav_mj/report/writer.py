@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -11,15 +11,19 @@ import pyarrow.parquet
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.files import csv_bytes, write_whole
+from socialnav_mj.metrics.metric import Metric
+from socialnav_mj.metrics.registry import METRICS
 from socialnav_mj.report.agents import Source
 from socialnav_mj.report.dialects import dialect_estimates
-from socialnav_mj.report.estimates import Estimate, summarise
+from socialnav_mj.report.estimates import Estimate, measures_of, summarise
 from socialnav_mj.report.html import html_page
+from socialnav_mj.report.own_metrics import own_metrics
+from socialnav_mj.report.own_section import own_section
 from socialnav_mj.report.page import report_page
 from socialnav_mj.report.paired import paired_differences
 from socialnav_mj.report.power import resolutions
 from socialnav_mj.report.results import Results, read_results
-from socialnav_mj.report.run_file import RUN_FILE, RunFile, read_run_file
+from socialnav_mj.report.run_file import RUN_FILE, RunFile, read_run_file, write_run_file
 from socialnav_mj.report.run_tables import run_blocks
 from socialnav_mj.report.sections import draws_section, fault_section, paired_section, severity_section
 from socialnav_mj.report.summary import summary_of
@@ -40,7 +44,9 @@ class Report:
     """In the order of the tables."""
 
 
-def write_report(folder: str | Path, *, dialects: Sequence[str] = (), n_jobs: int = 1) -> Report:
+def write_report(
+    folder: str | Path, *, dialects: Sequence[str] = (), metrics: Sequence[str] = (), n_jobs: int = 1
+) -> Report:
     """Make everything in a run folder again, except its episodes.
 
     All episodes are read and scored before the first file is replaced, and every file is replaced whole, so that a
@@ -50,6 +56,7 @@ def write_report(folder: str | Path, *, dialects: Sequence[str] = (), n_jobs: in
         folder: The run; holds `episodes/*.npz` and, if known, `run.json`.
         dialects: Other benchmarks whose definitions of the metrics get a table of their own, see
             `metrics.dialects.DIALECTS`.
+        metrics: Own metrics that the tables get too, as `own_metrics.own_metrics` takes them.
         n_jobs: Processes that read episodes.
 
     Returns:
@@ -64,26 +71,30 @@ def write_report(folder: str | Path, *, dialects: Sequence[str] = (), n_jobs: in
 
     folder = Path(folder)
     run = read_run_file(folder / RUN_FILE)
-    results = _results(folder, run, n_jobs)
-    estimates = summarise(results.agents)
+    own = own_metrics(metrics)
+    results = _results(folder, run, n_jobs, own=own)
+    estimates = summarise(results.agents, measures_of((*METRICS, *own)))
     differences = paired_differences(results.agents)
-    files = _tables(run, results, estimates, differences)
+    files = _tables(run, results, estimates, differences, own)
     for dialect in dialects:
         found = dialect_estimates(folder, results.sources, dialect, n_jobs=n_jobs)
         files[f"tables/dialect_{dialect}.csv"] = _csv(found)
+    if run is not None and run.metrics != tuple(metrics):
+        write_run_file(folder / RUN_FILE, replace(run, metrics=tuple(metrics)))
     for name, content in files.items():
         write_whole(folder / name, content)
     draw_paired(differences, folder / "figures")
-    write_whole(folder / PAGE, _page(folder, run, results, estimates, differences))
+    write_whole(folder / PAGE, _page(folder, run, results, estimates, differences, own))
     _write_traces(folder, results.sources)
     return Report(path=folder / "report.md", page=folder / PAGE, estimates=tuple(estimates))
 
 
-def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
+def report_tables(folder: str | Path, *, metrics: Sequence[str] = (), n_jobs: int = 1) -> dict[str, bytes]:
     """The tables that `write_report` makes of the episodes of a run, all scored anew, without writing them.
 
     Args:
         folder: See `write_report`.
+        metrics: See `write_report`.
         n_jobs: Processes that read episodes.
 
     Returns:
@@ -95,21 +106,29 @@ def report_tables(folder: str | Path, *, n_jobs: int = 1) -> dict[str, bytes]:
         ValueError: If run.json is not what is expected.
     """
     run = read_run_file(Path(folder) / RUN_FILE)
-    results = _results(Path(folder), run, n_jobs, anew=True)
-    estimates, differences = summarise(results.agents), paired_differences(results.agents)
-    page = _page(Path(folder), run, results, estimates, differences)
-    return _tables(run, results, estimates, differences) | {PAGE: page}
+    own = own_metrics(metrics)
+    results = _results(Path(folder), run, n_jobs, own=own, anew=True)
+    estimates = summarise(results.agents, measures_of((*METRICS, *own)))
+    differences = paired_differences(results.agents)
+    page = _page(Path(folder), run, results, estimates, differences, own)
+    return _tables(run, results, estimates, differences, own) | {PAGE: page}
 
 
-def _results(folder: Path, run: RunFile | None, n_jobs: int, *, anew: bool = False) -> Results:
-    return read_results(folder, controllers=() if run is None else run.controllers, n_jobs=n_jobs, anew=anew)
+def _results(folder: Path, run: RunFile | None, n_jobs: int, *, own: tuple[Metric, ...], anew: bool = False) -> Results:
+    metrics = (*METRICS, *own) if own else METRICS
+    controllers = () if run is None else run.controllers
+    return read_results(folder, controllers=controllers, metrics=metrics, n_jobs=n_jobs, anew=anew)
 
 
 def _tables(
-    run: RunFile | None, results: Results, estimates: Sequence[Estimate], differences: Sequence[Estimate]
+    run: RunFile | None,
+    results: Results,
+    estimates: Sequence[Estimate],
+    differences: Sequence[Estimate],
+    own: Sequence[Metric],
 ) -> dict[str, bytes]:
     summary = summary_of(results, estimates, None if run is None else run.command)
-    sections = _sections(results, differences)
+    sections = _sections(results, estimates, differences, own)
     return {
         "agents.parquet": _parquet(results.agents),
         "tables/collisions.parquet": _parquet(results.contacts),
@@ -120,8 +139,11 @@ def _tables(
     }
 
 
-def _sections(results: Results, differences: Sequence[Estimate]) -> list[str]:
+def _sections(
+    results: Results, estimates: Sequence[Estimate], differences: Sequence[Estimate], own: Sequence[Metric]
+) -> list[str]:
     return [
+        *own_section(estimates, measures_of(own)),
         *paired_section(differences, "figures/paired_humans.svg"),
         *fault_section(results.agents, results.contacts, results.overlaps),
         *severity_section(results.contacts),
@@ -135,9 +157,10 @@ def _page(
     results: Results,
     estimates: Sequence[Estimate],
     differences: Sequence[Estimate],
+    own: Sequence[Metric],
 ) -> bytes:
     """report.html with the figures that are in the folder."""
-    return html_page(run_blocks(results, estimates, _sections(results, differences), run), folder)
+    return html_page(run_blocks(results, estimates, _sections(results, estimates, differences, own), run), folder)
 
 
 def _csv(estimates: Sequence[Estimate]) -> bytes:
