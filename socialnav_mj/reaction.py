@@ -6,9 +6,9 @@ k exp(-tau / tau_0) / tau^2, and not on their distance. So whom nobody is going 
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from socialnav_mj.elementary import exp
 from socialnav_mj.episode import IntArray
@@ -167,7 +167,7 @@ def deviate(
     fastest = np.maximum(np.hypot(walk[:, 0], walk[:, 1]), MAX_SPEED)
     after = limited(walk + drift + timestep * force, fastest) - walk
     moved = offset + 0.5 * timestep * (drift + after)
-    back: NDArray[np.bool_] = ~by_robots[rows] & (np.hypot(*moved.T) < _BACK[0]) & (np.hypot(*after.T) < _BACK[1])
+    back: Any = ~by_robots[rows] & (np.hypot(*moved.T) < _BACK[0]) & (np.hypot(*after.T) < _BACK[1])
     moved[back], after[back] = 0.0, 0.0
     result = Deviation(offset=deviation.offset.copy(), drift=deviation.drift.copy())
     result.offset[rows], result.drift[rows] = moved, after

@@ -19,7 +19,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 ROWS = (
     {"resources", "elementary", "geometry", "config", "files", "processes", "slots", "robot_files"},
     {"recordings"},
-    {"contact", "outcome", "episode_checks", "episode_file", "observation", "episode", "features", "provenance"},
+    {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
     {
         "action",
         "cast",

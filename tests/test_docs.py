@@ -131,9 +131,11 @@ def test_commands_in_the_text_are_parsed(page, parse):
 def test_the_makefiles_commands_are_parsed(parse):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     found = re.findall(r"^\t\$\(BIN\)/socialnav-mj (.*)$", makefile, re.MULTILINE)
+    (shown,) = re.findall(r"^SHOWN := (.*)$", makefile, re.MULTILINE)
+    assert shown.split() == ["potential_field", "replay_irl", "hybrid", "mpc"]
     assert found
     for line in found:
-        parse(shlex.split(line.replace("$(OUT)", "runs/demo")))
+        parse(shlex.split(line.replace("$(OUT)", "runs/demo").replace("$(SHOWN)", shown)))
 
 
 def test_options_in_the_text_are_those_of_a_command(capsys):
@@ -151,6 +153,10 @@ def test_options_in_the_text_are_those_of_a_command(capsys):
         ["train", "replay-irl"],
         ["train", "attention"],
         ["fit-selector"],
+        ["check"],
+        ["export"],
+        ["view"],
+        [],
         ["data", "list"],
         ["data", "info"],
         ["data", "fetch"],
