@@ -5,11 +5,11 @@ FROM python:3.12-slim-bookworm
 RUN apt-get update \
     && apt-get install --no-install-recommends --yes make \
     && rm -rf /var/lib/apt/lists/* \
-    && useradd --create-home user
+    && useradd --create-home --uid 1000 user
 
-USER user
+USER 1000
 WORKDIR /home/user/socialnav_mj
-COPY --chown=user:user . .
+COPY --chown=1000:1000 . .
 RUN make install
 
 CMD ["make", "demo"]

@@ -318,7 +318,7 @@ def test_json_gives_one_object_and_quiet_only_errors(capsys):
     assert shown.err == ""
     found = json.loads(shown.out)
     names = {(e["controller"], e["measure"]) for e in found["estimates"]}
-    assert ("go_straight", "success") in names and found["lines"][0] == "report: o/report.md"
+    assert ("go_straight", "success") in names and found["lines"][0].startswith("report: o/report.html")
     main(["verify", "o", "--dataset", TINY, "--jobs", "1", "--json", "--quiet"])
     assert all(file["same"] for file in json.loads(capsys.readouterr().out)["files"])
     main(["list"])

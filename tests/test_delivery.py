@@ -24,7 +24,7 @@ def test_dockerfile_runs_the_demo_as_somebody_who_is_not_root() -> None:
     assert set(names) <= INSTRUCTIONS and names[0] == "FROM" and names[-1] == "CMD"
     assert re.fullmatch(r"python:3\.1[12]-[\w-]+", found[0][1])  # a Python that is supported, and no "latest"
     assert found[-1][1] == '["make", "demo"]'
-    assert names.index("USER") < names.index("COPY") and dict(found)["USER"] == "user"
+    assert names.index("USER") < names.index("COPY") and dict(found)["USER"] == "1000"
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in re.findall(r"make (\w+)", " ".join(text for name, text in found if name == "RUN")):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE)
