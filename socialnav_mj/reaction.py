@@ -6,7 +6,6 @@ k exp(-tau / tau_0) / tau^2, and not on their distance. So whom nobody is going 
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -153,7 +152,7 @@ def deviate(
         The deviation then; exactly 0 for whom no robot has pushed off its track, or who is back on it.
     """
     pushed = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
-    by_robots = pushed.any(axis=1)
+    by_robots = np.any(pushed, axis=1)
     rows = np.flatnonzero(by_robots | deviation.offset.any(axis=1) | deviation.drift.any(axis=1))
     if not rows.size:
         return deviation
@@ -167,8 +166,9 @@ def deviate(
     fastest = np.maximum(np.hypot(walk[:, 0], walk[:, 1]), MAX_SPEED)
     after = limited(walk + drift + timestep * force, fastest) - walk
     moved = offset + 0.5 * timestep * (drift + after)
-    back: Any = ~by_robots[rows] & (np.hypot(*moved.T) < _BACK[0]) & (np.hypot(*after.T) < _BACK[1])
-    moved[back], after[back] = 0.0, 0.0
+    near = np.asarray(np.hypot(*moved.T) < _BACK[0]) & np.asarray(np.hypot(*after.T) < _BACK[1])
+    back = np.flatnonzero(~by_robots[rows] & near)
+    moved[back] = after[back] = 0.0
     result = Deviation(offset=deviation.offset.copy(), drift=deviation.drift.copy())
     result.offset[rows], result.drift[rows] = moved, after
     _part(result, rows, following, body=body, timestep=timestep)

@@ -4,6 +4,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ class _Walk:
         def turned(vector: Array) -> Array:
             return np.stack([c * vector[:, 0] - s * vector[:, 1], s * vector[:, 0] + c * vector[:, 1]], axis=1)
 
-        places = {name: turned(getattr(self, name)) + shift for name in ("position", "goal", "people")}
+        places: dict[str, Any] = {name: turned(getattr(self, name)) + shift for name in ("position", "goal", "people")}
         return replace(self, **places, heading=self.heading + turn, people_velocity=turned(self.people_velocity))
 
 
@@ -116,7 +117,8 @@ def _walks(seed: int) -> tuple[_Walk, ...]:
         replace(_Walk.made("no agents", random), agents=nobody),
         replace(
             _Walk.made("all at one place, and at their goals", random),
-            **dict.fromkeys(("position", "goal"), place),
+            position=place,
+            goal=place,
             people=np.zeros((7, 2)),
             people_velocity=np.zeros((7, 2)),
             speed=np.zeros(5),
@@ -147,7 +149,7 @@ def examine(make: Callable[[], Controller], *, seed: int = 0) -> Iterator[Findin
 
     def finite() -> str:
         for walk in walks:
-            _require(walk, np.isfinite(run(walk)).all(axis=-1), run(walk), "finite wheel speeds")
+            _require(walk, np.all(np.isfinite(run(walk)), axis=-1), run(walk), "finite wheel speeds")
         return ""
 
     def within() -> str:
@@ -262,4 +264,4 @@ def _same(walk: _Walk, expected: Array, found: Array, tolerance: float, told: st
         near = (np.abs(found - expected) <= tolerance) | (np.isnan(found) & np.isnan(expected))
     where = np.argwhere(~near.all(axis=-1))
     text = f"{expected[tuple(where[0])].tolist()}, {told}" if len(where) else ""
-    _require(walk, near.all(axis=-1), found, text)
+    _require(walk, np.all(near, axis=-1), found, text)
