@@ -10,7 +10,8 @@ from socialnav_mj.cli import main
 from socialnav_mj.config import Scenario
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report import style
-from socialnav_mj.studies.conditions import ConditionStudy, kendall
+from socialnav_mj.studies.conditions import ConditionStudy
+from socialnav_mj.studies.kendall import kendall
 from socialnav_mj.studies.plant.study import PLANTS
 from socialnav_mj.studies.reaction.people_as_robots import people_as_robots
 from socialnav_mj.studies.reaction.study import LEVELS
