@@ -127,7 +127,7 @@ def test_web_viewer_listens_on_this_machine_alone(viewer):
 
 
 def test_web_viewer_draws_a_trace_without_the_network(browser, viewer):  # noqa: F811  pytest's way
-    opened = browser.new_page(viewport={"width": 1400, "height": 900})
+    opened = browser.new_page(viewport={"width": 1000, "height": 640})  # software draws every pixel
     hosts: set[str] = set()
     # What the page's policy stops is no request that went out.
     opened.on("response", lambda response: hosts.add(urlsplit(response.url).hostname or ""))
