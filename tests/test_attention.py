@@ -13,7 +13,7 @@ pytest.importorskip("stable_baselines3")
 from scenes import TINY  # noqa: E402
 
 from socialnav_mj import cli  # noqa: E402
-from socialnav_mj.controllers.attention import Attention, load_attention  # noqa: E402
+from socialnav_mj.controllers.attention import Attention, attention_folder, load_attention  # noqa: E402
 from socialnav_mj.controllers.policy_card import PolicyError  # noqa: E402
 from socialnav_mj.envs.sb3 import CrowdVecEnv  # noqa: E402
 from socialnav_mj.features import SIGHT, People, running_state  # noqa: E402
@@ -234,3 +234,15 @@ def test_command_trains_and_says_how_to_use_it(tmp_path, capsys):
     cli.main(["train", "attention", "--dataset", str(TINY), "--out", str(out), *small.split(), *windows.split()])
     assert f"attention(policy='{out / 'best.safetensors'}')" in "".join(capsys.readouterr().out.splitlines())
     assert Attention(policy=str(out / "best.safetensors")).name == "attention"
+
+
+# What is shipped
+
+
+def test_shipped_policies_have_complete_cards():
+    names = sorted(path.stem for path in attention_folder().glob("*.safetensors"))
+    assert names == [f"students003_people_seed{seed}" for seed in range(len(names))] and names
+    for name in names:
+        card = load_attention(name).card
+        assert set(card["metrics"]) == {"in_sample", "validation", "held_out"} and card["history"]
+        assert card["seed_spread"]["held_out"]["success"]["n"] == len(names)

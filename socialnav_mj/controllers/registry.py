@@ -10,6 +10,7 @@ from importlib.metadata import entry_points
 from operator import attrgetter
 from typing import Any
 
+from socialnav_mj.controllers.attention import Attention
 from socialnav_mj.controllers.base import IS_CONTROLLER, Controller
 from socialnav_mj.controllers.dynamic_window import DynamicWindow
 from socialnav_mj.controllers.go_straight import GoStraight
@@ -46,6 +47,7 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "mppi": MPPI,
     "irl_mpc": IRLMPC,
     "learned_selector": LearnedSelector,
+    "attention": Attention,
 }
 
 
