@@ -1,7 +1,6 @@
 """People who react: the recording's, off their tracks for robots and back on them, at every physics step."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -127,8 +126,7 @@ class ReactingCrowd:
             return position, velocity, walk
         known = (self._before.offset, self._before.drift, self._after.offset, self._after.drift)
         ends = [values[rows] for values in known]
-        offset: Any = sum(share * values for share, values in zip(self._place, ends, strict=True))
-        drift: Any = sum(share * values for share, values in zip(self._pace, ends, strict=True))
+        offset, drift = _blended(self._place, ends), _blended(self._pace, ends)
         position, velocity = position.copy(), velocity.copy()
         position[:, rows] += offset[:-1]
         velocity[:, rows] += drift[:-1]
@@ -146,6 +144,12 @@ class ReactingCrowd:
         offset, drift = deviation.offset.copy(), deviation.drift.copy()
         offset[people.changed], drift[people.changed] = 0.0, 0.0
         return Deviation(offset=offset, drift=drift)
+
+
+def _blended(shares: tuple[Array, ...], ends: list[Array]) -> Array:
+    """Sum of what is known at both ends, (k, 2) each, times its shares, (n_sub_steps + 1, 1, 1) each."""
+    one, two, three, four = (share * values for share, values in zip(shares, ends, strict=True))
+    return one + two + three + four
 
 
 def crowd_of(recording: Recording, scenario: Scenario, cast: Cast) -> Replay | ReactingCrowd:

@@ -92,6 +92,7 @@ def encounters() -> dict[str, Encounter]:
                 "maximum_acceleration": 5.0,
                 "mean_jerk": 4 * 25.0 / 49,  # each change is +-1 m/s in two of 49 second differences
                 "maximum_jerk": 25.0,
+                "unmet_share": 2 / 50,  # velocities are forward differences: a step early at the stop and at the start
             },
         ),
         "standing group": Encounter(

@@ -114,3 +114,14 @@ def test_bounds_themselves_are_allowed_and_move_with_what_they_depend_on() -> No
     Scenario(control_timestep=0.01, turn_limit="per_second")
     with pytest.raises(ValueError, match=r"control_timestep = 0\.6 .* at most 0\.5, in which a robot at 2\.0 m/s"):
         Scenario(control_timestep=0.6, robot=Robot(max_speed=2.0))
+
+
+def test_files_of_ordinary_episodes_are_as_before_and_those_of_before_are_read() -> None:
+    plain = Scenario().as_dict()
+    assert plain["pedestrian"] == "rigid" and not {"pedestrians", "plant", "floor_friction", "pedestrian_body"} & {
+        *plain
+    }
+    assert Scenario.from_dict(plain) == Scenario()
+    other = Scenario(pedestrians="weak", plant="unicycle", floor_friction=0.3, pedestrian_body="compliant")
+    assert Scenario.from_dict(other.as_dict()) == other
+    assert other.as_dict()["pedestrians"] == "weak" and other.as_dict()["pedestrian"] == "compliant"

@@ -12,7 +12,7 @@ from socialnav_mj.geometry import Array, arc, wheel_speed_of_twist
 from socialnav_mj.metrics.tracking import side_slip, stopping_distance, tracking_error, unmet_share
 from socialnav_mj.rollout import rollout
 from socialnav_mj.scene import build_model
-from socialnav_mj.studies.plant.study import HEAVY
+from socialnav_mj.studies.settings import HEAVY
 
 ALONE = (walk([(0, 0), (9, 0)], 1.0), stand((30, 30), 0.0, 9.0))
 

@@ -268,6 +268,21 @@ def test_scores_are_shown_where_there_are_any_and_a_name_may_hold_anything(path:
     assert "/chosen/score" in text and "/all/score" in text
 
 
+def test_thread_leads_from_a_person_to_its_recorded_place_while_it_is_off(path: Path, tmp_path: Path) -> None:
+    off = np.zeros((21, 2))
+    off[5:9] = [(0.3, 0.1), (0.5, 0.1), (0.4, 0.0), (0.01, 0.0)]
+    person = Pedestrian(positions=line((4, 1), (0, 1), 20), deviation=off)
+    reacting = build_episode([Agent(positions=line((0, 0), (4, 0), 20))], [person])
+    _, rows = read(write_trace(reacting, tmp_path / "reacting.rrd"))
+    drawn = rows["/scene/people/threads"]["LineStrips3D:strips"]
+    assert sorted(drawn) == [nanoseconds(0.2 * k) for k in (5, 6, 7, 8)] and not len(drawn[nanoseconds(1.6)])
+    for k in (5, 6, 7):
+        (thread,) = drawn[nanoseconds(0.2 * k)]
+        np.testing.assert_allclose(thread[0][:2], reacting.pedestrian_position[k, 0], atol=1e-6)
+        np.testing.assert_allclose(thread[1][:2], reacting.pedestrian_position[k, 0] - off[k], atol=1e-6)
+    assert "/scene/people/threads" not in read(path)[1]
+
+
 def test_two_files_of_one_episode_mean_the_same(episode: Episode, path: Path, tmp_path: Path) -> None:
     other = write_trace(episode, tmp_path / "again.rrd")
     np.testing.assert_equal(read(other), read(path))

@@ -1,6 +1,7 @@
 """How well robots do as they are told: what lies between command and motion, which a kinematic simulator leaves out."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import Episode
@@ -124,7 +125,7 @@ def _after_commands(episode: Episode, values: Array) -> Array:
     return mean_over(values, after & np.isfinite(values))
 
 
-def _no_stop(episode: Episode) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _no_stop(episode: Episode) -> NDArray[np.bool_]:
     return np.isnan(stopping_distance(episode))
 
 

@@ -18,6 +18,7 @@ from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.kendall import Tau, kendall
 from socialnav_mj.studies.levels import LevelTable, levels
 from socialnav_mj.studies.panel import Entry, Panel, Term, make_panel
+from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 from socialnav_mj.studies.study import CONTROLLERS, Run, Study
 
 
@@ -75,6 +76,20 @@ class ConditionStudy(Study):
             evaluation=evaluation,
             roster=(*entries, Entry(controller=HUMAN, method=HUMAN)),
         )
+
+
+def conditions_of(default: str, *names: str) -> tuple[Condition, ...]:
+    """The default setting and others as conditions.
+
+    Args:
+        default: What the default one is called.
+        *names: Others, of `settings.SETTINGS`.
+
+    Returns:
+        The default first.
+    """
+    others = (Condition(name=n, title=SETTINGS[n].title, task_kwargs=dict(SETTINGS[n].task_kwargs)) for n in names)
+    return (Condition(name=default, title=SETTINGS[DEFAULT].title), *others)
 
 
 def run_name(recording: str, condition: Condition) -> str:

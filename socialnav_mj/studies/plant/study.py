@@ -3,20 +3,13 @@
 from pathlib import Path
 
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.studies.conditions import Condition, ConditionStudy, compare
+from socialnav_mj.studies.conditions import ConditionStudy, compare, conditions_of
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
 from socialnav_mj.studies.plant.page import plant_page, verdict_rows
 from socialnav_mj.studies.slopes import draw_slopes
 from socialnav_mj.studies.study import read_runs
 
-HEAVY = {"robot_model": "robot_heavy.xml", "robot_wheel_radius": 0.0985, "robot_track": 0.4044}
-"""Settings of the heavier base; see assets/robot_heavy.xml."""
-PLANTS = (
-    Condition(name="wheels", title="wheels, the default"),
-    Condition(name="unicycle", title="ideal unicycle", task_kwargs={"plant": "unicycle"}),
-    Condition(name="heavy", title="a base of 28 kg, 1 m/s^2", task_kwargs=HEAVY),
-    Condition(name="slippery", title="floor friction 0.3", task_kwargs={"floor_friction": 0.3}),
-)
+PLANTS = conditions_of("wheels", "unicycle", "heavy", "slippery")
 RANKED = ("success", "intrusion_share_of_steps", "time_under_way")
 """Measures whose ranking of controllers is compared."""
 MEASURES = (

@@ -41,17 +41,23 @@ def reaction_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any])
 
 
 def _ranking(found: Sequence[Comparison]) -> list[str]:
-    rows = []
-    for own in found:
-        for scenario in own.scenarios:
-            cells = []
-            for (_, condition, measure), tau in own.taus.items():
-                if _ == scenario:
-                    cells.append(
-                        (f"{measure.replace('_', ' ')}, {condition}", interval(tau.mean, tau.low, tau.high, 2))
-                    )
-            rows.append([own.recording, SCENARIO_TITLES.get(scenario, scenario), *(text for _, text in cells)])
-    heads = [head for head, _ in cells]
+    measures = list(dict.fromkeys(measure for _, _, measure in found[0].taus))
+    names = [condition.name for condition in found[0].conditions[1:]]
+    rows = [
+        [
+            own.recording,
+            SCENARIO_TITLES.get(scenario, scenario),
+            *(
+                interval(tau.mean, tau.low, tau.high, 2)
+                for measure in measures
+                for name in names
+                for tau in (own.taus[scenario, name, measure],)
+            ),
+        ]
+        for own in found
+        for scenario in own.scenarios
+    ]
+    heads = [f"Kendall's tau by {measure.replace('_', ' ')}, {name}" for measure in measures for name in names]
     return table(["recording", "scenario", *heads], rows)
 
 
@@ -66,7 +72,7 @@ def _spread(found: Sequence[Comparison]) -> list[str]:
                 means = [level.interval.mean for level in levels if level is not None]
                 cells.append(f"{min(means):.3f} to {max(means):.3f}" if means else "-")
             rows.append([own.recording, SCENARIO_TITLES.get(scenario, scenario), *cells])
-    titles = [f"success, {condition.title}" for condition in found[0].conditions]
+    titles = [f"success, {condition.name}" for condition in found[0].conditions]
     return table(["recording", "scenario", *titles], rows)
 
 

@@ -32,7 +32,7 @@ Each recorded track plays a robot among all other people, one at a time; people 
 every control step. *On time*: they have reacted to that person in the recording, so that the added reaction should \
 move them little. *Late*: the same track as a stranger's, whom nobody has reacted to. *KS*: Kolmogorov-Smirnov \
 distance between the values without and with the reaction, of speeds at all steps and of each neighbour's least \
-distance. *Touches*: neighbours whose centre came within {distance:.2f} m, without (as in the human row) and with.
+distance. *Collisions*: neighbours whose centre came within {distance:.2f} m, without (as in the human row) and with.
 """
 
 
@@ -169,10 +169,10 @@ def write_test(
         rows.append([*cells, f"{o.touches_recorded} / {o.touches}"])
         lines.append(
             f"{o.recording}, k = {label}, {when}: mean displacement {o.mean_displacement:.4f} m, "
-            f"touches {o.touches_recorded} -> {o.touches}"
+            f"collisions {o.touches_recorded} -> {o.touches}"
         )
     heads = ["recording", "k [m^2]", "tracks", "mean displacement [m]", "moved by more than 1 cm", "95 % below [m]"]
-    heads += ["KS of speed", "KS of nearest distance", "touches, without / with"]
+    heads += ["KS of speed", "KS of nearest distance", "collisions, without / with"]
     text = ["# People as robots", "", _HOW_TO_READ.format(distance=Scenario().contact_distance)]
     text += [*table(heads, rows), "![displacement](figures/displacement.png)", ""]
     return write_whole(out / "README.md", "\n".join(text).encode()), lines

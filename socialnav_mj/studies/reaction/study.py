@@ -3,17 +3,13 @@
 from pathlib import Path
 
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.studies.conditions import Condition, ConditionStudy, compare
+from socialnav_mj.studies.conditions import ConditionStudy, compare, conditions_of
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
 from socialnav_mj.studies.reaction.page import reaction_page
 from socialnav_mj.studies.slopes import draw_slopes
 from socialnav_mj.studies.study import read_runs
 
-LEVELS = (
-    Condition(name="replay", title="people keep to the recording"),
-    Condition(name="weak", title="people give way weakly", task_kwargs={"pedestrians": "weak"}),
-    Condition(name="yielding", title="people give way as to each other", task_kwargs={"pedestrians": "yielding"}),
-)
+LEVELS = conditions_of("replay", "weak", "yielding")
 RANKED = ("success", "intrusion_share_of_steps")
 """Measures whose ranking of controllers is compared."""
 MEASURES = (
