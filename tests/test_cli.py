@@ -386,7 +386,7 @@ def test_edited_controller_is_told_before_anything_runs_and_run_anew_or_kept(cap
     with pytest.raises(SystemExit):
         main(["verify", "o", "--dataset", TINY, "--trust", "mine:Spin", "--jobs", "1"])
     told = capsys.readouterr().out
-    assert "11 of 13 files say" in told and "DIFFERS: controller_config.sources.mine:Spin in mine.py = " in told
+    assert "12 of 14 files say" in told and "DIFFERS: controller_config.sources.mine:Spin in mine.py = " in told
 
     (kept,) = Path("o/episodes").glob("*spin-*.npz")
     kept.unlink()
