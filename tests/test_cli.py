@@ -128,7 +128,7 @@ def test_recording_is_read_as_the_command_says_and_verified_so(tmp_path, capsys)
     assert metadata["frame_rate"] == 12.5
     assert metadata["reading"] == {"columns": ["x", "id", "frame", "y"], "units": "cm"}
     main(["verify", "o", "--dataset", str(path), "--max-gap", "400", "--jobs", "1"])
-    assert "11 of 11 files say what their re-simulation says" in capsys.readouterr().out
+    assert "12 of 12 files say what their re-simulation says" in capsys.readouterr().out
     with pytest.raises(SystemExit):
         main(["verify", "o", "--dataset", str(path), "--jobs", "1"])
     assert "--max-gap lifts it" in capsys.readouterr().out
