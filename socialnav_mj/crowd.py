@@ -30,19 +30,23 @@ class ReactingCrowd:
         self._distance, self._body = scenario.contact_distance, 2.0 * scenario.pedestrian_radius
         self._timestep, self._fine = scenario.control_timestep, scenario.physics_timestep
         count = scenario.n_sub_steps
-        share = np.arange(count + 1)[:, None, None] / count
+        share = np.arange(count + 1) / count
         # Of the offset before, the drift before, the offset after, the drift after; then the same of the velocity.
-        self._place = (
-            (1.0 + 2.0 * share) * (1.0 - share) ** 2,
-            self._timestep * share * (1.0 - share) ** 2,
-            share * share * (3.0 - 2.0 * share),
-            self._timestep * share * share * (share - 1.0),
+        self._place = np.stack(
+            [
+                (1.0 + 2.0 * share) * (1.0 - share) ** 2,
+                self._timestep * share * (1.0 - share) ** 2,
+                share * share * (3.0 - 2.0 * share),
+                self._timestep * share * share * (share - 1.0),
+            ]
         )
-        self._pace = (
-            6.0 * share * (share - 1.0) / self._timestep,
-            (1.0 - share) * (1.0 - 3.0 * share),
-            6.0 * share * (1.0 - share) / self._timestep,
-            share * (3.0 * share - 2.0),
+        self._pace = np.stack(
+            [
+                6.0 * share * (share - 1.0) / self._timestep,
+                (1.0 - share) * (1.0 - 3.0 * share),
+                6.0 * share * (1.0 - share) / self._timestep,
+                share * (3.0 * share - 2.0),
+            ]
         )
         self.begin()
 
@@ -92,23 +96,24 @@ class ReactingCrowd:
         self._step, self._after = step, self._before
         if not now.present.size or not (len(robots.position) or self._before.rows.size):
             return
-        slots = now.present
-        w, z = now.quaternion[slots, 0], now.quaternion[slots, 3]
-        stays = now.pedestrian[slots] == then.pedestrian[slots]
-        after = deviate(
-            Deviation(offset=self._before.offset[slots], drift=self._before.drift[slots]),
-            people=Movers(position=people.position[slots], velocity=people.velocity[slots]),
-            recorded=Movers(position=now.position[slots], velocity=now.velocity[slots]),
-            following=np.where(stays[:, None], then.position[slots], np.nan),
-            facing=np.stack([w * w - z * z, 2.0 * w * z], axis=1),
+        following = then.position
+        if then.changed.size:
+            following = following.copy()
+            following[then.changed] = np.nan
+        w, z = now.quaternion[:, 0], now.quaternion[:, 3]
+        # Whoever is not there is NaN, and so meets nobody.
+        self._after = deviate(
+            self._before,
+            people=Movers(position=people.position, velocity=people.velocity),
+            recorded=Movers(position=now.position, velocity=now.velocity),
+            following=following,
+            facing=(w * w - z * z, 2.0 * w * z),
             robots=robots,
             strength=self._strength,
             timestep=self._timestep,
             distance=self._distance,
             body=self._body,
         )
-        self._after = Deviation.none(len(now.pedestrian))
-        self._after.offset[slots], self._after.drift[slots] = after.offset, after.drift
 
     def motion(self, step: int) -> tuple[Array, Array, Array | None]:
         """How people move in the control step of the last `react`.
@@ -120,13 +125,13 @@ class ReactingCrowd:
             As `Replay.motion`, off the tracks.
         """
         position, velocity, walk = self._replay.motion(step)
-        rows = np.union1d(self._before.rows, self._after.rows)
+        known = np.array((self._before.offset, self._before.drift, self._after.offset, self._after.drift))
+        rows = np.flatnonzero((known != 0.0).any(axis=(0, 2)))
         last, self._walk = self._walk, np.zeros_like(self._walk)
         if not rows.size:
             return position, velocity, walk
-        known = (self._before.offset, self._before.drift, self._after.offset, self._after.drift)
-        ends = [values[rows] for values in known]
-        offset, drift = _blended(self._place, ends), _blended(self._pace, ends)
+        ends = known[:, rows]
+        offset, drift = np.einsum("kt,krd->trd", self._place, ends), np.einsum("kt,krd->trd", self._pace, ends)
         position, velocity = position.copy(), velocity.copy()
         position[:, rows] += offset[:-1]
         velocity[:, rows] += drift[:-1]
@@ -144,12 +149,6 @@ class ReactingCrowd:
         offset, drift = deviation.offset.copy(), deviation.drift.copy()
         offset[people.changed], drift[people.changed] = 0.0, 0.0
         return Deviation(offset=offset, drift=drift)
-
-
-def _blended(shares: tuple[Array, ...], ends: list[Array]) -> Array:
-    """Sum of what is known at both ends, (k, 2) each, times its shares, (n_sub_steps + 1, 1, 1) each."""
-    one, two, three, four = (share * values for share, values in zip(shares, ends, strict=True))
-    return one + two + three + four
 
 
 def crowd_of(recording: Recording, scenario: Scenario, cast: Cast) -> Replay | ReactingCrowd:

@@ -6,10 +6,10 @@ k exp(-tau / tau_0) / tau^2, and not on their distance. So whom nobody is going 
 """
 
 from dataclasses import dataclass
+from math import exp, hypot, sqrt
 
 import numpy as np
 
-from socialnav_mj.elementary import exp
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array
 
@@ -38,6 +38,8 @@ RETURN_TIME = 1.0
 """In which a person wants to be back on its track: twice that, so that it hardly swings over [s]."""
 RETURN_SPEED = 0.5
 """But no faster than that besides the recorded velocity [m/s]."""
+NOTICE = 0.05
+"""Who is off its track by less, along each axis, is to the others what it is in the recording [m]."""
 _NEARER = 0.98
 """Who is nearer than the distance that is kept does not want to come nearer: the distance becomes that share."""
 _SHARPEST = 0.5
@@ -85,40 +87,48 @@ class Deviation:
         return np.flatnonzero(self.offset.any(axis=1) | self.drift.any(axis=1))
 
 
-def push(people: Movers, others: Movers, *, distance: float, facing: Array | None = None) -> Array:
+def push(people: Movers, others: Movers, *, distance: float, facing: tuple[Array, Array] | None = None) -> Array:
     """Acceleration away from predicted collisions, for k = 1: minus the gradient of exp(-tau / tau_0) / tau^2.
 
     With x and v from the other to the person, n = x + v tau and s = sqrt((x v)^2 - v^2 (x^2 - R^2)) it is
     exp(-tau / tau_0) / tau^2 (2 / tau + 1 / tau_0) n / s.
 
     Args:
-        people: Who is pushed, m.
-        others: Who is avoided, k. The same body at the same place does not count.
+        people: Who is pushed, m; arrays may have more axes in front, for several crowds at once.
+        others: Who is avoided, k, with the same axes in front. The same body at the same place does not count.
         distance: R between centres that counts as a collision [m].
-        facing: Unit vectors, shape (m, 2): others out of sight count less; None if all count alike.
+        facing: Cosines and sines of the headings, each (m,): others out of sight count less; None if all count alike.
 
     Returns:
-        Shape (m, 2); exactly 0 for who meets nobody within `HORIZON` [m/s^2 per m^2].
+        The shape of people's positions; exactly 0 for who meets nobody within `HORIZON` [m/s^2 per m^2].
     """
-    x = people.position[:, None] - others.position
-    v = people.velocity[:, None] - others.velocity
-    square, speed_square = _dot(x, x), _dot(v, v)
-    approach = _dot(x, v)
-    kept = np.minimum(distance * distance, _NEARER * _NEARER * square)
-    discriminant = approach * approach - speed_square * (square - kept)
-    i, j = np.nonzero((approach < 0.0) & (discriminant > 0.0))
-    root = np.sqrt(discriminant[i, j])
-    time = (square[i, j] - kept[i, j]) / (root - approach[i, j])
-    soon = time < HORIZON
-    i, j, root, time = i[soon], j[soon], root[soon], time[soon]
-    there = x[i, j] + v[i, j] * time[:, None]
-    steep = np.maximum(root, _SHARPEST * np.sqrt(speed_square[i, j] * kept[i, j]))
-    late = np.maximum(time, LEAST_TIME)
-    size = exp(-late / SCREENING_TIME) / (late * late) * (2.0 / late + 1.0 / SCREENING_TIME) / steep
-    if facing is not None:
-        seen = -_dot(x[i, j], facing[i]) >= SIGHT_COSINE * np.sqrt(square[i, j])
-        size = np.where(seen, size, UNSEEN * size)
-    return np.stack([np.bincount(i, size * there[:, axis], len(people.position)) for axis in (0, 1)], axis=1)
+    x = people.position[..., :, None, :] - others.position[..., None, :, :]
+    v = people.velocity[..., :, None, :] - others.velocity[..., None, :, :]
+    x_0, x_1, v_0, v_1 = x[..., 0], x[..., 1], v[..., 0], v[..., 1]
+    across, limit = x_0 * v_1 - x_1 * v_0, distance * distance
+    meets = (x_0 * v_0 + x_1 * v_1 < 0.0) & (across * across < limit * (v_0 * v_0 + v_1 * v_1))
+    result = np.zeros_like(people.position)
+    # There are few, and for few the C library's numbers, one after the other, are faster than arrays.
+    pairs = np.nonzero(meets)
+    rows = zip(*(index.tolist() for index in pairs[:-1]), strict=True)
+    for row, (a, b), (c, d) in zip(rows, x[pairs].tolist(), v[pairs].tolist(), strict=True):
+        square, speed, approach = a * a + b * b, c * c + d * d, a * c + b * d
+        kept = min(limit, _NEARER * _NEARER * square)
+        discriminant = approach * approach - speed * (square - kept)
+        if discriminant <= 0.0:
+            continue
+        root = sqrt(discriminant)
+        time = (square - kept) / (root - approach)
+        if time >= HORIZON:
+            continue
+        late = max(time, LEAST_TIME)
+        size = exp(-late / SCREENING_TIME) / (late * late) * (2.0 / late + 1.0 / SCREENING_TIME)
+        size /= max(root, _SHARPEST * sqrt(speed * kept))
+        if facing is not None:
+            seen = -(a * float(facing[0][row]) + b * float(facing[1][row])) >= SIGHT_COSINE * sqrt(square)
+            size *= 1.0 if seen else UNSEEN
+        result[row] += (size * (a + c * time), size * (b + d * time))
+    return result
 
 
 def deviate(
@@ -127,7 +137,7 @@ def deviate(
     people: Movers,
     recorded: Movers,
     following: Array,
-    facing: Array,
+    facing: tuple[Array, Array],
     robots: Movers,
     strength: float,
     timestep: float,
@@ -138,10 +148,10 @@ def deviate(
 
     Args:
         deviation: Of m people now.
-        people: Where they are.
+        people: Where they are; NaN for who is not there.
         recorded: Where the recording has them.
         following: Where it has them one step later, shape (m, 2); NaN for who will have left [m].
-        facing: Unit vectors of their headings, shape (m, 2).
+        facing: Cosines and sines of their headings, each (m,).
         robots: To which they react.
         strength: k [m^2].
         timestep: Of the control step [s].
@@ -152,32 +162,56 @@ def deviate(
         The deviation then; exactly 0 for whom no robot has pushed off its track, or who is back on it.
     """
     pushed = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
-    by_robots = np.any(pushed, axis=1)
-    rows = np.flatnonzero(by_robots | deviation.offset.any(axis=1) | deviation.drift.any(axis=1))
+    rows = np.flatnonzero(((pushed != 0.0) | (deviation.offset != 0.0) | (deviation.drift != 0.0)).any(axis=1))
     if not rows.size:
         return deviation
-    offset, drift, force = deviation.offset[rows], deviation.drift[rows], pushed[rows]
-    # Of the others it takes notice as far as the deviation changes what they are to it: they are in the recording.
-    here, there = (Movers(position=m.position[rows], velocity=m.velocity[rows]) for m in (people, recorded))
-    force = force + strength * (push(here, people, distance=body) - push(there, recorded, distance=body))
-    wanted = -limited(offset / RETURN_TIME, RETURN_SPEED)
-    force = limited(force + (wanted - drift) / RELAXATION_TIME, MAX_ACCELERATION)
-    walk = recorded.velocity[rows]
-    fastest = np.maximum(np.hypot(walk[:, 0], walk[:, 1]), MAX_SPEED)
-    after = limited(walk + drift + timestep * force, fastest) - walk
-    moved = offset + 0.5 * timestep * (drift + after)
-    near = np.asarray(np.hypot(*moved.T) < _BACK[0]) & np.asarray(np.hypot(*after.T) < _BACK[1])
-    back = np.flatnonzero(~by_robots[rows] & near)
-    moved[back] = after[back] = 0.0
+    force = pushed.copy()
+    noticing = np.flatnonzero((np.abs(deviation.offset) > NOTICE).any(axis=1))
+    if noticing.size:
+        # Of the others it takes notice as far as the deviation changes what they are to it: they are in the recording.
+        place, pace = (np.array((getattr(people, name), getattr(recorded, name))) for name in ("position", "velocity"))
+        own = Movers(position=place[:, noticing], velocity=pace[:, noticing])
+        by_people = push(own, Movers(position=place, velocity=pace), distance=body)
+        force[noticing] += strength * (by_people[0] - by_people[1])
     result = Deviation(offset=deviation.offset.copy(), drift=deviation.drift.copy())
-    result.offset[rows], result.drift[rows] = moved, after
+    values = (deviation.offset[rows], deviation.drift[rows], force[rows], recorded.velocity[rows], pushed[rows])
+    for row, *of_person in zip(rows.tolist(), *(value.tolist() for value in values), strict=True):
+        result.offset[row], result.drift[row] = _stepped(*of_person, timestep)
     _part(result, rows, following, body=body, timestep=timestep)
     return result
+
+
+Pair = tuple[float, float]
+
+
+def _stepped(offset: Pair, drift: Pair, force: Pair, walk: Pair, pushed: Pair, timestep: float) -> tuple[Pair, Pair]:
+    """Offset and drift of one person after a step, of what it wants and what pushes it, within its limits."""
+    back = _limited(-offset[0] / RETURN_TIME, -offset[1] / RETURN_TIME, RETURN_SPEED)
+    total = (force[0] + (back[0] - drift[0]) / RELAXATION_TIME, force[1] + (back[1] - drift[1]) / RELAXATION_TIME)
+    change = _limited(*total, MAX_ACCELERATION)
+    fastest = max(hypot(*walk), MAX_SPEED)
+    after = _limited(walk[0] + drift[0] + timestep * change[0], walk[1] + drift[1] + timestep * change[1], fastest)
+    new = after[0] - walk[0], after[1] - walk[1]
+    there = tuple(o + 0.5 * timestep * (d + n) for o, d, n in zip(offset, drift, new, strict=True))
+    if not any(pushed) and hypot(*there) < _BACK[0] and hypot(*new) < _BACK[1]:
+        return (0.0, 0.0), (0.0, 0.0)
+    return (there[0], there[1]), new
+
+
+def _limited(x: float, y: float, limit: float) -> Pair:
+    """A vector, shortened if it is longer than a limit."""
+    length = hypot(x, y)
+    return (x * limit / length, y * limit / length) if length > limit else (x, y)
 
 
 def _part(deviation: Deviation, rows: IntArray, following: Array, *, body: float, timestep: float) -> None:
     """Move apart, in place, who would be nearer than a body is wide, and nearer than the recording has them."""
     offset, before = deviation.offset, deviation.offset[rows].copy()
+    there = following + offset
+    now = there[rows][:, None] - there
+    # Everybody is near itself, unless it will have left.
+    if np.count_nonzero(now[..., 0] ** 2 + now[..., 1] ** 2 < body * body) <= np.isfinite(there[rows, 0]).sum():
+        return
     gap = following[rows][:, None] - following
     least = np.minimum(np.hypot(gap[..., 0], gap[..., 1]), body)
     least[np.arange(len(rows)), rows] = np.nan
@@ -194,21 +228,3 @@ def _part(deviation: Deviation, rows: IntArray, following: Array, *, body: float
         lack = (least - apart)[i, j, None] * np.where(deviates[j], 0.5, 1.0)[:, None]
         np.add.at(offset, rows[i], lack * way)
     deviation.drift[rows] += (offset[rows] - before) / timestep
-
-
-def limited(vectors: Array, limit: Array | float) -> Array:
-    """Vectors, shortened where they are longer than a limit.
-
-    Args:
-        vectors: Shape (m, 2).
-        limit: > 0, for all or for each, shape (m,).
-
-    Returns:
-        Shape (m, 2).
-    """
-    length = np.hypot(vectors[:, 0], vectors[:, 1])
-    return vectors * np.minimum(1.0, limit / np.maximum(length, limit))[:, None]
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]

@@ -72,7 +72,7 @@ def test_push_turns_with_the_scene_and_out_of_sight_counts_less() -> None:
     turned = push(movers((0, 0, 0, 1)), movers((-0.2, 2.0, 0, -0.5)), distance=0.42)[0]
     np.testing.assert_allclose(turned, [-plain[1], plain[0]], rtol=1e-12)
     for facing, factor in (((1.0, 0.0), 1.0), ((0.0, 1.0), 1.0), ((-1.0, 0.0), UNSEEN)):
-        seen = push(movers(person), movers(robot), distance=0.42, facing=np.array([facing]))[0]
+        seen = push(movers(person), movers(robot), distance=0.42, facing=tuple(np.array([[facing[0]], [facing[1]]])))[0]
         np.testing.assert_allclose(seen, factor * plain, rtol=1e-12)
 
 
@@ -92,7 +92,7 @@ def walked(
             people=Movers(position=there.position + deviation.offset, velocity=there.velocity + deviation.drift),
             recorded=there,
             following=there.position + 0.2 * recorded.velocity,
-            facing=heading,
+            facing=(heading[:, 0], heading[:, 1]),
             robots=robot,
             strength=strength,
             timestep=0.2,
