@@ -126,7 +126,7 @@ class ReactingCrowd:
         """
         position, velocity, walk = self._replay.motion(step)
         known = np.array((self._before.offset, self._before.drift, self._after.offset, self._after.drift))
-        rows = np.flatnonzero((known != 0.0).any(axis=(0, 2)))
+        rows = np.flatnonzero(known.any(axis=(0, 2)))
         last, self._walk = self._walk, np.zeros_like(self._walk)
         if not rows.size:
             return position, velocity, walk

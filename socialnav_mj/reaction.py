@@ -102,16 +102,20 @@ def push(people: Movers, others: Movers, *, distance: float, facing: tuple[Array
     Returns:
         The shape of people's positions; exactly 0 for who meets nobody within `HORIZON` [m/s^2 per m^2].
     """
-    x = people.position[..., :, None, :] - others.position[..., None, :, :]
-    v = people.velocity[..., :, None, :] - others.velocity[..., None, :, :]
-    x_0, x_1, v_0, v_1 = x[..., 0], x[..., 1], v[..., 0], v[..., 1]
-    across, limit = x_0 * v_1 - x_1 * v_0, distance * distance
-    meets = (x_0 * v_0 + x_1 * v_1 < 0.0) & (across * across < limit * (v_0 * v_0 + v_1 * v_1))
+    x_0, x_1, v_0, v_1 = (
+        own[..., :, None, axis] - other[..., None, :, axis]
+        for own, other in ((people.position, others.position), (people.velocity, others.velocity))
+        for axis in (0, 1)
+    )
+    across = x_0 * v_1 - x_1 * v_0
+    meets = x_0 * v_0 + x_1 * v_1 < 0.0
+    limit = distance * distance
+    meets &= across * across < limit * (v_0 * v_0 + v_1 * v_1)
     result = np.zeros_like(people.position)
     # There are few, and for few the C library's numbers, one after the other, are faster than arrays.
     pairs = np.nonzero(meets)
     rows = zip(*(index.tolist() for index in pairs[:-1]), strict=True)
-    for row, (a, b), (c, d) in zip(rows, x[pairs].tolist(), v[pairs].tolist(), strict=True):
+    for row, a, b, c, d in zip(rows, *(values[pairs].tolist() for values in (x_0, x_1, v_0, v_1)), strict=True):
         square, speed, approach = a * a + b * b, c * c + d * d, a * c + b * d
         kept = min(limit, _NEARER * _NEARER * square)
         discriminant = approach * approach - speed * (square - kept)
@@ -162,7 +166,8 @@ def deviate(
         The deviation then; exactly 0 for whom no robot has pushed off its track, or who is back on it.
     """
     pushed = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
-    rows = np.flatnonzero(((pushed != 0.0) | (deviation.offset != 0.0) | (deviation.drift != 0.0)).any(axis=1))
+    by_robots = pushed.any(axis=1)
+    rows = np.flatnonzero(by_robots | deviation.offset.any(axis=1) | deviation.drift.any(axis=1))
     if not rows.size:
         return deviation
     force = pushed.copy()
@@ -173,10 +178,11 @@ def deviate(
         own = Movers(position=place[:, noticing], velocity=pace[:, noticing])
         by_people = push(own, Movers(position=place, velocity=pace), distance=body)
         force[noticing] += strength * (by_people[0] - by_people[1])
+    values = (deviation.offset[rows], deviation.drift[rows], force[rows], recorded.velocity[rows], by_robots[rows])
+    after = [_stepped(*of_person, timestep) for of_person in zip(*(value.tolist() for value in values), strict=True)]
     result = Deviation(offset=deviation.offset.copy(), drift=deviation.drift.copy())
-    values = (deviation.offset[rows], deviation.drift[rows], force[rows], recorded.velocity[rows], pushed[rows])
-    for row, *of_person in zip(rows.tolist(), *(value.tolist() for value in values), strict=True):
-        result.offset[row], result.drift[row] = _stepped(*of_person, timestep)
+    both = np.array(after)
+    result.offset[rows], result.drift[rows] = both[:, :2], both[:, 2:]
     _part(result, rows, following, body=body, timestep=timestep)
     return result
 
@@ -184,18 +190,20 @@ def deviate(
 Pair = tuple[float, float]
 
 
-def _stepped(offset: Pair, drift: Pair, force: Pair, walk: Pair, pushed: Pair, timestep: float) -> tuple[Pair, Pair]:
+def _stepped(
+    offset: Pair, drift: Pair, force: Pair, walk: Pair, pushed: bool, timestep: float
+) -> tuple[float, float, float, float]:
     """Offset and drift of one person after a step, of what it wants and what pushes it, within its limits."""
-    back = _limited(-offset[0] / RETURN_TIME, -offset[1] / RETURN_TIME, RETURN_SPEED)
-    total = (force[0] + (back[0] - drift[0]) / RELAXATION_TIME, force[1] + (back[1] - drift[1]) / RELAXATION_TIME)
-    change = _limited(*total, MAX_ACCELERATION)
-    fastest = max(hypot(*walk), MAX_SPEED)
-    after = _limited(walk[0] + drift[0] + timestep * change[0], walk[1] + drift[1] + timestep * change[1], fastest)
-    new = after[0] - walk[0], after[1] - walk[1]
-    there = tuple(o + 0.5 * timestep * (d + n) for o, d, n in zip(offset, drift, new, strict=True))
-    if not any(pushed) and hypot(*there) < _BACK[0] and hypot(*new) < _BACK[1]:
-        return (0.0, 0.0), (0.0, 0.0)
-    return (there[0], there[1]), new
+    x, y = _limited(-offset[0] / RETURN_TIME, -offset[1] / RETURN_TIME, RETURN_SPEED)
+    x, y = force[0] + (x - drift[0]) / RELAXATION_TIME, force[1] + (y - drift[1]) / RELAXATION_TIME
+    x, y = _limited(x, y, MAX_ACCELERATION)
+    u, v = walk
+    x, y = _limited(u + drift[0] + timestep * x, v + drift[1] + timestep * y, max(hypot(u, v), MAX_SPEED))
+    x, y = x - u, y - v
+    there = offset[0] + 0.5 * timestep * (drift[0] + x), offset[1] + 0.5 * timestep * (drift[1] + y)
+    if not pushed and hypot(*there) < _BACK[0] and hypot(x, y) < _BACK[1]:
+        return 0.0, 0.0, 0.0, 0.0
+    return *there, x, y
 
 
 def _limited(x: float, y: float, limit: float) -> Pair:
