@@ -166,7 +166,7 @@ def deviate(
         The deviation then; exactly 0 for whom no robot has pushed off its track, or who is back on it.
     """
     pushed = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
-    by_robots = pushed.any(axis=1)
+    by_robots = np.any(pushed, axis=1)
     rows = np.flatnonzero(by_robots | deviation.offset.any(axis=1) | deviation.drift.any(axis=1))
     if not rows.size:
         return deviation
@@ -179,7 +179,8 @@ def deviate(
         by_people = push(own, Movers(position=place, velocity=pace), distance=body)
         force[noticing] += strength * (by_people[0] - by_people[1])
     values = (deviation.offset[rows], deviation.drift[rows], force[rows], recorded.velocity[rows], by_robots[rows])
-    after = [_stepped(*of_person, timestep) for of_person in zip(*(value.tolist() for value in values), strict=True)]
+    listed = (value.tolist() for value in values)
+    after = [_stepped(o, d, f, w, p, timestep) for o, d, f, w, p in zip(*listed, strict=True)]
     result = Deviation(offset=deviation.offset.copy(), drift=deviation.drift.copy())
     both = np.array(after)
     result.offset[rows], result.drift[rows] = both[:, :2], both[:, 2:]
