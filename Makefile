@@ -53,7 +53,7 @@ shell: $(PLAIN)
 	@PATH="$(abspath $(BIN)):$$PATH" $${SHELL:-sh}
 
 test: lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 slow: $(ALL)
 	$(BIN)/python -m pytest -m slow
