@@ -31,23 +31,20 @@ class ReactingCrowd:
         self._timestep, self._fine = scenario.control_timestep, scenario.physics_timestep
         count = scenario.n_sub_steps
         share = np.arange(count + 1) / count
-        # Of the offset before, the drift before, the offset after, the drift after; then the same of the velocity.
-        self._place = np.stack(
-            [
-                (1.0 + 2.0 * share) * (1.0 - share) ** 2,
-                self._timestep * share * (1.0 - share) ** 2,
-                share * share * (3.0 - 2.0 * share),
-                self._timestep * share * share * (share - 1.0),
-            ]
+        # Of the offset and drift before, and those after: first for places, then for velocities.
+        place = (
+            (1.0 + 2.0 * share) * (1.0 - share) ** 2,
+            self._timestep * share * (1.0 - share) ** 2,
+            share * share * (3.0 - 2.0 * share),
+            self._timestep * share * share * (share - 1.0),
         )
-        self._pace = np.stack(
-            [
-                6.0 * share * (share - 1.0) / self._timestep,
-                (1.0 - share) * (1.0 - 3.0 * share),
-                6.0 * share * (1.0 - share) / self._timestep,
-                share * (3.0 * share - 2.0),
-            ]
+        pace = (
+            6.0 * share * (share - 1.0) / self._timestep,
+            (1.0 - share) * (1.0 - 3.0 * share),
+            6.0 * share * (1.0 - share) / self._timestep,
+            share * (3.0 * share - 2.0),
         )
+        self._shares = np.stack([np.concatenate(both) for both in zip(place, pace, strict=True)])
         self.begin()
 
     def begin(self) -> None:
@@ -55,7 +52,7 @@ class ReactingCrowd:
         people = self._replay.crowd(0)
         self._step = 0
         self._before = self._after = Deviation.none(len(people.pedestrian))
-        self._walk = np.zeros((len(people.pedestrian), 2))
+        self._walk = self._still = np.zeros((len(people.pedestrian), 2))
 
     def crowd(self, step: int) -> SlotCrowd:
         """Everybody in the scene at a control step.
@@ -73,13 +70,11 @@ class ReactingCrowd:
             deviation = self._stayed(self._after, recorded)
         else:
             return recorded
-        rows = deviation.rows
-        if not rows.size:
+        if not deviation.offset.any() and not deviation.drift.any():
             return recorded
-        position, velocity = recorded.position.copy(), recorded.velocity.copy()
-        position[rows] += deviation.offset[rows]
-        velocity[rows] += deviation.drift[rows]
-        return replace(recorded, position=position, velocity=velocity)
+        return replace(
+            recorded, position=recorded.position + deviation.offset, velocity=recorded.velocity + deviation.drift
+        )
 
     def react(self, step: int, people: SlotCrowd, robots: Movers) -> None:
         """Decide how people walk in the control step that comes.
@@ -92,7 +87,8 @@ class ReactingCrowd:
         now, then = self._replay.crowd(step), self._replay.crowd(step + 1)
         if step != self._step:
             self._before = self._stayed(self._after, now)
-            self._walk[now.changed] = 0.0
+            if now.changed.size and self._walk is not self._still:
+                self._walk[now.changed] = 0.0
         self._step, self._after = step, self._before
         if not now.present.size or not (len(robots.position) or self._before.rows.size):
             return
@@ -126,21 +122,15 @@ class ReactingCrowd:
         """
         position, velocity, walk = self._replay.motion(step)
         known = np.array((self._before.offset, self._before.drift, self._after.offset, self._after.drift))
-        rows = np.flatnonzero(known.any(axis=(0, 2)))
-        last, self._walk = self._walk, np.zeros_like(self._walk)
-        if not rows.size:
+        last, self._walk = self._walk, self._still
+        if not known.any():
             return position, velocity, walk
-        ends = known[:, rows]
-        offset, drift = np.einsum("kt,krd->trd", self._place, ends), np.einsum("kt,krd->trd", self._pace, ends)
-        position, velocity = position.copy(), velocity.copy()
-        position[:, rows] += offset[:-1]
-        velocity[:, rows] += drift[:-1]
+        offset, drift = np.split(np.einsum("kt,kmd->tmd", self._shares, known), 2)
         if walk is not None:
             steps = np.diff(offset, axis=0) / self._fine
-            walk = walk.copy()
-            walk[:, rows] += np.concatenate([last[rows][None], steps])
-            self._walk[rows] = steps[-1]
-        return position, velocity, walk
+            walk = walk + np.concatenate([last[None], steps])
+            self._walk = steps[-1].copy()
+        return position + offset[:-1], velocity + drift[:-1], walk
 
     def _stayed(self, deviation: Deviation, people: SlotCrowd) -> Deviation:
         """A deviation without that of people who have left; who comes is on the track."""

@@ -38,8 +38,8 @@ RETURN_TIME = 1.0
 """In which a person wants to be back on its track: twice that, so that it hardly swings over [s]."""
 RETURN_SPEED = 0.5
 """But no faster than that besides the recorded velocity [m/s]."""
-NOTICE = 0.05
-"""Who is off its track by less, along each axis, is to the others what it is in the recording [m]."""
+NOTICE = 0.15
+"""Who is off its track by less, along each axis, is to the others what it is in the recording: half a body [m]."""
 _NEARER = 0.98
 """Who is nearer than the distance that is kept does not want to come nearer: the distance becomes that share."""
 _SHARPEST = 0.5
@@ -171,7 +171,7 @@ def deviate(
     if not rows.size:
         return deviation
     force = pushed.copy()
-    noticing = np.flatnonzero((np.abs(deviation.offset) > NOTICE).any(axis=1))
+    noticing = rows[np.abs(deviation.offset[rows]).max(axis=1) > NOTICE]
     if noticing.size:
         # Of the others it takes notice as far as the deviation changes what they are to it: they are in the recording.
         place, pace = (np.array((getattr(people, name), getattr(recorded, name))) for name in ("position", "velocity"))
