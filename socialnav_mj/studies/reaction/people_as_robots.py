@@ -78,7 +78,7 @@ def people_as_robots(recording: Recording, strength: float, *, late: float = 0.0
     steps = int(last.max()) + 1
     place, velocity, heading = recorded_series(recording, np.arange(n), first, last, steps, dt)
     angle = np.nan_to_num(heading)
-    ahead, left = cos(angle), sin(angle)
+    cosine, sine = cos(angle), sin(angle)
     way = np.linalg.norm(recording.end - recording.start, axis=1)
     players = np.flatnonzero((last - first >= _SHORTEST) & (way >= scenario.minimum_displacement))
     moved, speeds, nearest = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros((2, 0))]
@@ -95,7 +95,7 @@ def people_as_robots(recording: Recording, strength: float, *, late: float = 0.0
                 people=Movers(position=recorded.position + own.offset, velocity=recorded.velocity + own.drift),
                 recorded=recorded,
                 following=place[k + 1, rows],
-                facing=(ahead[k, rows], left[k, rows]),
+                facing=(cosine[k, rows], sine[k, rows]),
                 robots=Movers(position=place[k - shift, [player]], velocity=velocity[k - shift, [player]]),
                 strength=strength,
                 timestep=dt,
