@@ -40,7 +40,9 @@ def test_changes_are_of_the_scenario_or_of_its_robot() -> None:
     assert changed == Scenario(share=0.7, goal_radius=0.3, robot=Robot(track=0.3, radius=0.2))
     assert scenario == Scenario(share=0.7, robot=Robot(track=0.3)) == scenario.changed()
     for name in ("robot", "radius", "robot_colour", "goal"):
-        with pytest.raises(ValueError, match=rf"^unknown settings {name}; available: share, .*, robot_max_speed$"):
+        with pytest.raises(
+            ValueError, match=rf"^unknown settings {name}; available: share, .*, robot_max_speed, robot_max_yaw_rate$"
+        ):
             scenario.changed(**{name: 1.0})
 
 

@@ -241,7 +241,7 @@ def test_reward_of_spectral_norm_is_the_networks_in_numpy_too(tmp_path):
 
 def test_crowd_turns_as_fast_as_the_turn_limit_says():
     for turn_limit, rate in (("per_step", np.pi / 6.0 / 0.2), ("per_second", np.pi / 6.0)):
-        assert model_of(small(turn_limit=turn_limit)).crowd._limits.max_yaw_rate == pytest.approx(rate)
+        assert model_of(small(turn_limit=turn_limit)).crowd._crowd.limits.max_yaw_rate == pytest.approx(rate)
 
 
 def test_average_weighs_each_updates_actor_by_its_number():

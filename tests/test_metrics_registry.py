@@ -99,6 +99,9 @@ EDGES = {
     "start is goal": build_episode([Agent(positions=np.zeros((4, 2)), goal=(0, 0))], [standing((0, 0), 4)]),
     "crowd": crowd(),
     "human row": as_human_row(crowd()),
+    "told to stop at once": build_episode(
+        [Agent(positions=[(0, 0), *[(0.2, 0)] * 5], twist=np.zeros((5, 2)), goal=(9, 0), outcome=Outcome.UNFINISHED)]
+    ),
     "human row without collisions": as_human_row(build_episode([Agent(positions=EAST)], [standing((2, 1), 9)])),
     "touched after the end": build_episode(
         [Agent(positions=EAST)], [standing((4, 0), 30)], [Touch(agent=0, partner=0, step=25)]
@@ -147,7 +150,7 @@ def altered(episode, need):
         drift = 0.03 * np.arange(len(episode.time))[:, None, None] ** 1.5 * np.array([0.2, 1.0])
         return replace(episode, agent_position=episode.agent_position + drift)
     if need is Need.HEADING:
-        return replace(episode, agent_heading=episode.agent_heading + 0.4)
+        return replace(episode, agent_heading=episode.agent_heading + 0.6)
     if need is Need.VELOCITY:
         growth = np.linspace(0.05, 3.0, len(episode.time))[:, None, None] ** 2
         return replace(episode, agent_velocity=episode.agent_velocity * growth)

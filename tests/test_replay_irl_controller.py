@@ -136,6 +136,7 @@ def test_policy_is_part_of_the_configuration(tmp_path):
         "policy": path,
         "checksum": hashlib.sha256(Path(path).read_bytes()).hexdigest(),
         "name": "replay_irl",
+        "sources": {path: hashlib.sha256(Path(path).read_bytes()).hexdigest()},
     }
     assert make_controller(f"replay_irl(policy={path!r})").policy == path
 

@@ -288,7 +288,7 @@ def test_episodes_of_different_controller_settings_are_not_compared(run):
     episode = make("potential_field", 0.1, 9)
     other = replace(episode, metadata=episode.metadata | {"controller_config": {"gain": 2.0}})
     other.save(run / "episodes" / "other.npz")
-    with pytest.raises(EpisodeError, match=r"other\.npz.* controller / potential_field: .*1\.0.* and .*2\.0"):
+    with pytest.raises(EpisodeError, match=r"other\.npz.* controller / potential_field: gain = 1\.0, but 2\.0"):
         read_results(run)
 
 

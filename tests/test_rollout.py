@@ -80,8 +80,8 @@ def test_size_of_the_pool_changes_no_bit_of_an_episode(settings, slots, robots, 
     expected, n_agents = rollout(environment, PotentialField(), scenario_name="made"), environment.physics.n_agents
     assert len(expected.contact_time) and n_agents == 4
 
-    def other(*args):
-        cast = cast_recording(*args)
+    def other(*args, **kwargs):
+        cast = cast_recording(*args, **kwargs)
         return replace(cast, n_agent_slots=n_agents + slots, n_likely_agents=n_agents + robots)
 
     monkeypatch.setattr("socialnav_mj.task.cast_recording", other)
@@ -122,7 +122,8 @@ def test_own_controller_is_recorded_as_it_commanded():
     np.testing.assert_array_equal(episode.agent_wheel_speed[active], expected[active])
     assert np.isnan(episode.agent_wheel_speed[~active]).all()
     assert episode.policies == ("noted",) and (episode.agent_policy[active] == 0).all()
-    assert episode.metadata["controller_config"] == {"class": f"{__name__}:Noted"}
+    config = episode.metadata["controller_config"]
+    assert config["class"] == f"{__name__}:Noted" and f"{__name__}:Noted in test_rollout.py" in config["sources"]
 
 
 def test_controller_sees_what_is_recorded():

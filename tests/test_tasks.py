@@ -234,7 +234,14 @@ def test_keywords_become_the_scenario() -> None:
     scenario = tasks.load("scenario_1", {"dataset": TINY, **given, **of_robot}).task.scenario
     assert {key: getattr(scenario, key) for key in given} == given
     assert scenario.robot == Robot(radius=0.21, max_speed=0.8)
-    assert set(SETTINGS) == {*given, *of_robot, "robot_model", "robot_wheel_radius", "robot_track"}
+    assert set(SETTINGS) == {
+        *given,
+        *of_robot,
+        "robot_model",
+        "robot_wheel_radius",
+        "robot_track",
+        "robot_max_yaw_rate",
+    }
 
 
 def test_scenario_can_be_given_whole_and_changed() -> None:

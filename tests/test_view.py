@@ -127,7 +127,7 @@ def test_browsers_viewer_tells_its_address_until_it_is_stopped(run, monkeypatch,
             raise KeyboardInterrupt
 
     monkeypatch.setattr("socialnav_mj.trace.web.web_viewer", serve)
-    monkeypatch.setattr("socialnav_mj.cli.view.threading.Event", Stopped)
+    monkeypatch.setattr("socialnav_mj.cli.view.Event", Stopped)
     View(path=run, web=True, port=9123).run()
     assert "traces: 3, shown at http://127.0.0.1:9123 until Ctrl-C" in capsys.readouterr().out
 

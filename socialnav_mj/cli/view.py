@@ -2,10 +2,10 @@
 
 import subprocess
 import tempfile
-import threading
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Literal
 
 import tyro
@@ -40,7 +40,7 @@ class View:
 
         with suppress(KeyboardInterrupt), web_viewer(paths, self.port) as address:  # how it is closed
             say(f"traces: {len(paths) - 1}, shown at {address} until Ctrl-C")
-            threading.Event().wait()
+            Event().wait()
 
     def _in_window(self, paths: list[Path]) -> None:
         from socialnav_mj.trace.start import viewer_command, viewer_environment
