@@ -82,6 +82,8 @@ def test_metrics_are_invariant_when_the_map_is_rotated_moved_or_mirrored(cast, a
             moved[name] = angle + (-value if flip else value)
         elif name == "agent_wheel_speed" and flip:
             moved[name] = value[..., ::-1].copy()
+        elif name == "agent_yaw_rate" and flip:
+            moved[name] = -value
     same(episode, replace(episode, **moved))
 
 
