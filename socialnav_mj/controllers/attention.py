@@ -10,7 +10,7 @@ import numpy as np
 from socialnav_mj.controllers.base import Observation, TwistController
 from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.replay_irl import policies_folder
-from socialnav_mj.controllers.weights import Layers, forward, networks_of, read_weights
+from socialnav_mj.controllers.weights import Layers, checked_checksum, forward, networks_of, read_weights
 from socialnav_mj.elementary import exp
 from socialnav_mj.features import People, view_of
 from socialnav_mj.geometry import Array
@@ -140,11 +140,7 @@ class Attention(TwistController):
 
     def __post_init__(self) -> None:
         self._trained = load_attention(self.policy)
-        if self.checksum not in (None, self._trained.checksum):
-            raise PolicyError(
-                f"policy {self.policy!r} has checksum {self._trained.checksum}, but {self.checksum} is asked for"
-            )
-        self.checksum = self._trained.checksum
+        self.checksum = checked_checksum(self.policy, self._trained.checksum, self.checksum)
 
     def twist(self, observation: Observation) -> Array:
         """The mean action, scaled to the limits.

@@ -13,6 +13,7 @@ from socialnav_mj.controllers.planning.search import Costs
 from socialnav_mj.controllers.planning.terms import Crowd
 from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.replay_irl import DEFAULT_POLICY, TrainedPolicy, load_policy
+from socialnav_mj.controllers.weights import checked_checksum
 from socialnav_mj.features import GOAL_FLAG, absorbing_state
 from socialnav_mj.geometry import Array
 
@@ -46,11 +47,7 @@ class IRLMPC(MPC):
         if not (isinstance(weight, (int, float)) and 0.0 <= weight < np.inf):
             raise ValueError(f"learned_weight = {weight!r} is not allowed; allowed: numbers >= 0")
         self._trained = load_policy(self.policy)
-        if self.checksum not in (None, self._trained.checksum):
-            raise PolicyError(
-                f"policy {self.policy!r} has checksum {self._trained.checksum}, but {self.checksum} is asked for"
-            )
-        self.checksum = self._trained.checksum
+        self.checksum = checked_checksum(self.policy, self._trained.checksum, self.checksum)
         if self._trained.features.name != FEATURES:
             raise PolicyError(
                 f"policy {self.policy!r} has features {self._trained.features.name!r}; irl_mpc needs {FEATURES!r}"

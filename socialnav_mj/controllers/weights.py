@@ -107,3 +107,22 @@ def _numbers(path: Path, tensors: Tensors, key: str) -> Array:
     if not (np.abs(values) <= np.finfo(np.float32).max).all():
         raise PolicyError(f"{path}: {key} holds values that are not finite, or too large for single precision")
     return values
+
+
+def checked_checksum(policy: str, found: str, wanted: str | None) -> str:
+    """The sha256 of a policy's weights, if it is the one that is asked for.
+
+    Args:
+        policy: Its name or path.
+        found: That its weights have.
+        wanted: That they must have; None takes them as they are.
+
+    Returns:
+        `found`.
+
+    Raises:
+        PolicyError: If they differ.
+    """
+    if wanted not in (None, found):
+        raise PolicyError(f"policy {policy!r} has checksum {found}, but {wanted} is asked for")
+    return found

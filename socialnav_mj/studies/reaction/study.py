@@ -2,12 +2,9 @@
 
 from pathlib import Path
 
-from socialnav_mj.recordings import load_recording
-from socialnav_mj.studies.conditions import ConditionStudy, compare, conditions_of
-from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
+from socialnav_mj.studies.condition_files import write_conditions
+from socialnav_mj.studies.conditions import ConditionStudy, conditions_of
 from socialnav_mj.studies.reaction.page import reaction_page
-from socialnav_mj.studies.slopes import draw_slopes
-from socialnav_mj.studies.study import read_runs
 
 LEVELS = conditions_of("replay", "weak", "yielding")
 RANKED = ("success", "intrusion_share_of_steps")
@@ -48,13 +45,15 @@ def write_reaction(study: ConditionStudy, out: Path, *, command: str, n_jobs: in
         FileNotFoundError: If a run has no episodes.
         EpisodeError: If an episode is damaged or does not fit the others.
     """
-    results = read_runs(study, out, n_jobs=n_jobs)
-    found = [compare(study, results, recording, MEASURES, RANKED) for recording in study.recordings]
-    write_csv(out / "tables" / "levels.csv", [row for own in found for row in own.level_rows()])
-    write_csv(out / "tables" / "differences.csv", [row for own in found for row in own.difference_rows()])
-    write_csv(out / "tables" / "ranking.csv", [row for own in found for row in own.tau_rows()])
-    for own in found:
-        draw_slopes(own, _SLOPES, out / "figures", f"slopes_{own.recording}")
-    recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
-    provenance = write_provenance(study, results, recordings, out, command=command)
-    return write_pages(out, reaction_page(found, provenance=provenance), results, command=command)
+    return write_conditions(
+        study,
+        out,
+        measures=MEASURES,
+        ranked=RANKED,
+        slopes=_SLOPES,
+        figure="slopes",
+        page=reaction_page,
+        tables={},
+        command=command,
+        n_jobs=n_jobs,
+    )
