@@ -54,10 +54,10 @@ def _of_setting(name: str, *, is_full: bool = False) -> Variant:
 DEFAULT = Variant(name="default", title="default", is_full=True)
 VARIANTS: tuple[Variant, ...] = (
     DEFAULT,
-    Variant(name="capped", title="capped field in the paper's place", field=CAPPED, runs=(MIXED,), is_full=True),
     _of_setting("turn_per_second", is_full=True),
-    _of_setting("yielding", is_full=True),
-    _of_setting("unicycle", is_full=True),
+    Variant(name="capped", title="capped field in the paper's place", field=CAPPED, runs=(MIXED,), is_full=True),
+    _of_setting("yielding"),
+    _of_setting("unicycle"),
     _of_setting("radii_0.25"),
     _of_setting("radii_0.40"),
     _of_setting("retire"),
