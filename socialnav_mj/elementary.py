@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
-def _each(function: Callable[..., float], *arguments: ArrayLike) -> NDArray[np.float64]:
-    arrays = np.broadcast_arrays(*(np.asarray(values, dtype=float) for values in arguments))
-    results = map(function, *(values.ravel().tolist() for values in arrays))
-    return np.fromiter(results, dtype=float, count=arrays[0].size).reshape(arrays[0].shape)
+def _each(function: Callable[[float], float], values: ArrayLike) -> NDArray[np.float64]:
+    values = np.asarray(values, dtype=float)
+    return np.array(list(map(function, values.ravel().tolist())), dtype=float).reshape(values.shape)
 
 
 def exp(values: ArrayLike) -> NDArray[np.float64]:
@@ -90,4 +89,7 @@ def arctan2(y: ArrayLike, x: ArrayLike) -> NDArray[np.float64]:
     Returns:
         The shape of both together, in [-pi, pi] [rad].
     """
-    return _each(math.atan2, y, x)
+    y, x = np.asarray(y, dtype=float), np.asarray(x, dtype=float)
+    if y.shape != x.shape:
+        y, x = np.broadcast_arrays(y, x)
+    return np.array(list(map(math.atan2, y.ravel().tolist(), x.ravel().tolist())), dtype=float).reshape(y.shape)

@@ -66,6 +66,8 @@ class Ghosts:
         Returns:
             Slots of those who may touch robots from now on, ascending.
         """
+        if not (self._slots or now.changed.size):
+            return now.changed
         changed = set(now.changed.tolist())
         self._slots = (self._slots - changed) | (changed & set(now.present.tolist()))
         pending = np.array(sorted(self._slots), dtype=np.int64)

@@ -30,10 +30,27 @@ def to_agent_frame(vector: ArrayLike, heading: ArrayLike) -> Array:
     Returns:
         The vectors' components ahead of and to the left of the agent, shape (..., 2).
     """
-    vector = np.asarray(vector, dtype=float)
-    x, y, c, s = vector[..., 0], vector[..., 1], cos(heading), sin(heading)
+    return turned_back(np.asarray(vector, dtype=float), cos(heading), sin(heading))
+
+
+def turned_back(vector: Array, cosine: Array, sine: Array) -> Array:
+    """Rotate vectors by the opposite of an angle: world vectors into a frame that is turned by it.
+
+    Args:
+        vector: Shape (..., 2).
+        cosine: Of the angle, broadcastable to shape (...).
+        sine: Of the angle, likewise.
+
+    Returns:
+        Shape (..., 2), of all arguments together.
+    """
+    x, y = vector[..., 0], vector[..., 1]
     # Not one complex product: that rounds otherwise on other processors, see `elementary`.
-    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
+    ahead = cosine * x + sine * y
+    result = np.empty((*ahead.shape, 2))
+    result[..., 0] = ahead
+    np.subtract(cosine * y, sine * x, out=result[..., 1])
+    return result
 
 
 def yaw_of_quaternion(quaternion: ArrayLike) -> Array:

@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.geometry import Array, to_agent_frame
+from socialnav_mj.elementary import cos, sin
+from socialnav_mj.geometry import Array, turned_back
 
 
 def observe(
@@ -75,22 +76,21 @@ def observe(
     if not rows.size:
         return result
     here, facing, moving = position[rows], heading[rows], velocity[rows]
-    own = to_agent_frame(moving, facing)
+    c, s = cos(facing), sin(facing)
+    own = turned_back(moving, c, s)
     result["position"][rows] = here
     result["heading"][rows] = facing
     result["twist"][rows, 0] = own[:, 0]
     result["twist"][rows, 1] = yaw_rate[rows]
-    result["goal"][rows] = to_agent_frame(goal[rows] - here, facing)
-    facing = facing[:, None]
+    result["goal"][rows] = turned_back(goal[rows] - here, c, s)
+    c, s = c[:, None], s[:, None]
     people = (rows[:, None], pedestrian_slots)
     result["pedestrian_mask"][people] = True
-    result["pedestrian_position"][people] = to_agent_frame(
-        pedestrian_position[pedestrian_slots] - here[:, None], facing
-    )
-    result["pedestrian_velocity"][people] = to_agent_frame(pedestrian_velocity[pedestrian_slots][None], facing)
+    result["pedestrian_position"][people] = turned_back(pedestrian_position[pedestrian_slots] - here[:, None], c, s)
+    result["pedestrian_velocity"][people] = turned_back(pedestrian_velocity[pedestrian_slots], c, s)
     others = (rows[:, None], rows)
     seen = ~np.eye(len(rows), dtype=bool)
     result["agent_mask"][others] = seen
-    result["agent_position"][others] = to_agent_frame(here - here[:, None], facing) * seen[..., None]
-    result["agent_velocity"][others] = to_agent_frame(moving[None], facing) * seen[..., None]
+    result["agent_position"][others] = turned_back(here - here[:, None], c, s) * seen[..., None]
+    result["agent_velocity"][others] = turned_back(moving, c, s) * seen[..., None]
     return result

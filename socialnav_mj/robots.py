@@ -45,7 +45,7 @@ class RobotPool(MujocoPhysics):
         Returns:
             Shape (n_agents, 2) [m].
         """
-        return self._of_slots(self.data.qpos[self._index.qpos[:, None] + (0, 1)])
+        return self._of_slots(self.data.qpos[self._index.position])
 
     def agent_heading(self) -> Array:
         """Direction the robots face.
@@ -61,7 +61,7 @@ class RobotPool(MujocoPhysics):
         Returns:
             Shape (n_agents, 2) [m/s].
         """
-        return self._of_slots(self.data.qvel[self._index.qvel[:, None] + (0, 1)])
+        return self._of_slots(self.data.qvel[self._index.velocity])
 
     def agent_yaw_rate(self) -> Array:
         """Angular velocity about the robots' own upward axis.
@@ -81,7 +81,7 @@ class RobotPool(MujocoPhysics):
         return self._of_slots(arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
 
     def _agent_quaternion(self) -> Array:
-        return self.data.qpos[self._index.qpos[:, None] + (3, 4, 5, 6)]
+        return self.data.qpos[self._index.quaternion]
 
     def _of_slots(self, values: Array) -> Array:
         """Rows of the robots, and rows of zeros for the slots beyond the pool."""

@@ -81,7 +81,8 @@ def _checked_policy(controller: Controller, n_slots: int) -> NDArray[np.int64]:
     if policy is None:
         return np.zeros(n_slots, dtype=np.int64)
     policy, names = np.asarray(policy), _policies(controller)
-    if policy.shape != (n_slots,) or not np.isin(policy, np.arange(len(names))).all():
+    known = policy.dtype.kind in "biu" and policy.shape == (n_slots,)
+    if not known or (n_slots and not 0 <= policy.min() <= policy.max() < len(names)):
         raise ValueError(
             f"active_policy = {policy} of controller {controller.name!r}; expected shape ({n_slots},) with indices "
             f"into its policies {names}"

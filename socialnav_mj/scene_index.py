@@ -18,6 +18,12 @@ class SceneIndex:
     """(n,) first address of each robot's free joint in `qpos`: 3 of position, 4 of the quaternion."""
     qvel: IntArray
     """(n,) the same in `qvel`: 3 of velocity, 3 of angular velocity."""
+    position: IntArray
+    """(n, 2) addresses of each robot's x and y in `qpos`."""
+    quaternion: IntArray
+    """(n, 4) addresses of each robot's quaternion in `qpos`."""
+    velocity: IntArray
+    """(n, 2) addresses of each robot's velocity along x and y in `qvel`."""
     ctrl: IntArray
     """(n, 2) actuators of forward speed and yaw rate."""
     agent_bodies: tuple[IntArray, ...]
@@ -91,9 +97,14 @@ def index_scene(model: mujoco.MjModel) -> SceneIndex:
     owner[bumpers] = np.arange(len(agents))
     first_person = int(model.numeric(AGENT_SLOTS).data[0])
     owner[bodies] = first_person + np.arange(len(people))
+    qpos = np.array([model.joint(name + "root").qposadr[0] for name in agents], dtype=np.int64)
+    qvel = np.array([model.joint(name + "root").dofadr[0] for name in agents], dtype=np.int64)
     return SceneIndex(
-        qpos=np.array([model.joint(name + "root").qposadr[0] for name in agents], dtype=np.int64),
-        qvel=np.array([model.joint(name + "root").dofadr[0] for name in agents], dtype=np.int64),
+        qpos=qpos,
+        qvel=qvel,
+        position=qpos[:, None] + (0, 1),
+        quaternion=qpos[:, None] + (3, 4, 5, 6),
+        velocity=qvel[:, None] + (0, 1),
         ctrl=np.array([[model.actuator(name + what).id for what in ("forward", "yaw")] for name in agents]),
         agent_tree=np.asarray(model.body_treeid)[robots].astype(np.int64),
         agent_bodies=belonging(np.arange(model.nbody)),

@@ -221,13 +221,15 @@ class CrowdTask(base.Task):
     def _update_pedestrians(self, physics: Physics) -> None:
         """Place people at the current step; whoever appears on a robot stays contact-free until clear of all robots."""
         now = self._crowd.crowd(self.step)
-        physics.park_pedestrians(now.changed)
+        if now.changed.size:
+            physics.park_pedestrians(now.changed)
         there = now.present
         physics.set_pedestrian_pose(there, now.position[there], now.quaternion[there], now.velocity[there])
         self.people = people_of(physics, now)
         agent, distance = self._slot_agent[self._slot_agent != NOBODY], self.scenario.contact_distance
         solid = self.ghosts.solidify(self.people, agent, self._robots(physics), distance=distance)
-        physics.set_pedestrian_contacts(solid, np.ones(len(solid), dtype=bool))
+        if solid.size:
+            physics.set_pedestrian_contacts(solid, np.ones(len(solid), dtype=bool))
 
     def _robots(self, physics: Physics) -> Array:
         """Positions of the robots under way, shape (k, 2) [m]."""
@@ -270,16 +272,13 @@ class CrowdTask(base.Task):
         distance = np.linalg.norm(self.cast.agent_goal[agents] - self._sample.position[slots], axis=1)
         self._reward[slots] += PROGRESS_REWARD * (self._goal_distance[slots] - distance)
         self._goal_distance[slots] = distance
-        arrived = distance <= self.scenario.goal_radius
-        late = self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]
-        # What comes first here ends the run if several do in one step; it stays under way if none does.
-        ways = {
-            Outcome.OVERTURNED: self._sample.tilt[slots] > OVERTURNED_TILT,
-            Outcome.COLLIDED: np.isin(slots, struck if self.scenario.on_collision == "retire" else []),
-            Outcome.ARRIVED: arrived,
-            Outcome.TIMED_OUT: late,
-        }
-        outcome = np.select(list(ways.values()), list(ways), _UNDER_WAY)
+        # What comes last here ends the run if several do in one step.
+        outcome = np.full(len(slots), _UNDER_WAY, dtype=np.int64)
+        outcome[self.step - self.spawn_step[agents] >= self.cast.agent_allowed_steps[agents]] = Outcome.TIMED_OUT
+        outcome[distance <= self.scenario.goal_radius] = Outcome.ARRIVED
+        if struck and self.scenario.on_collision == "retire":
+            outcome[np.isin(slots, struck)] = Outcome.COLLIDED
+        outcome[self._sample.tilt[slots] > OVERTURNED_TILT] = Outcome.OVERTURNED
         self._reward[slots[outcome == Outcome.ARRIVED]] += ARRIVAL_REWARD
         for row in np.flatnonzero(outcome != _UNDER_WAY):
             slot, agent = int(slots[row]), int(agents[row])

@@ -216,7 +216,7 @@ class TouchLog:
         index = self.index
         normal = data.contact.frame[contact, :2] * (-1.0 if flip else 1.0)
         length = float(np.linalg.norm(normal, axis=-1))
-        heading = yaw_of_quaternion(data.qpos[index.qpos[:, None] + (3, 4, 5, 6)])
+        heading = yaw_of_quaternion(data.qpos[index.quaternion])
         if other < index.first_person:
             kind, partner = Partner.AGENT, other
             partner_heading = float(heading[partner])

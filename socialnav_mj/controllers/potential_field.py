@@ -15,6 +15,8 @@ MINIMUM_DISTANCE = 0.05
 MINIMUM_TURN = 1e-3
 """Least turn that eq 7 divides by, as a share of pi; below pi times this the speed is at its limit anyway."""
 
+_USED = ("goal", "twist", "pedestrian_position", "pedestrian_mask", "agent_position", "agent_mask")
+
 
 def attractive_force(
     goal: Array, velocity: Array, *, position_gain: float, velocity_gain: float, limit: float | None
@@ -149,13 +151,16 @@ class PotentialField(TwistController):
         """Speed and yaw rate along the total force.
 
         Args:
-            observation: Keys as in `socialnav_mj.observation`; uses what `force` uses.
+            observation: Keys as in `socialnav_mj.observation`; uses active and what `force` uses.
 
         Returns:
-            Shape (n_agents, 2) [m/s], [rad/s].
+            Shape (n_agents, 2) [m/s], [rad/s]; 0 for inactive slots.
         """
-        speed, turn = speed_and_turn(self.force(observation))
-        return np.stack([speed, turn / self.limits.control_timestep], axis=1)
+        rows = np.flatnonzero(observation["active"])
+        speed, turn = speed_and_turn(self.force({key: observation[key][rows] for key in _USED}))
+        result = np.zeros((len(observation["active"]), 2))
+        result[rows] = np.stack([speed, turn / self.limits.control_timestep], axis=1)
+        return result
 
 
 @dataclass(kw_only=True)
