@@ -212,8 +212,26 @@ def hand_values(name: str, encounter: Encounter) -> dict[str, float]:
         "public_zone_share": sum(d >= 3.6 for d in near) / n,
         "space_compliance": sum(d >= 0.5 for d in near) / n,
         "social_work": social_work(name, encounter),
+        "braking_imposed": braking_imposed(encounter),
     }
     return {**ORDINARY, **sums, **own}
+
+
+def braking_imposed(encounter: Encounter) -> int:
+    """Pair by pair with complex numbers; whether discs meet within 4 s is tried every millisecond."""
+    episode, count = encounter.episode, 0
+    for k in range(encounter.steps):
+        p, v = complex(*episode.agent_position[k, 0]), complex(*episode.agent_velocity[k, 0])
+        hard = False
+        for j in range(episode.n_pedestrians):
+            q, w = complex(*episode.pedestrian_position[k, j]), complex(*episode.pedestrian_velocity[k, j])
+            gap, e = abs(q - p) - 0.32, (p - q) / abs(q - p)
+            if min(abs(q - p + (w - v) * t / 1000.0) for t in range(4001)) > 0.32:
+                continue
+            towards = max(0.0, min((w * e.conjugate()).real, ((w - v) * e.conjugate()).real))
+            hard |= towards > 0.0 if gap <= 0.0 else towards**2 / (2.0 * gap) > 1.0
+        count += hard
+    return count
 
 
 def social_work(name: str, encounter: Encounter) -> float:

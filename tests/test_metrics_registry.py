@@ -89,6 +89,7 @@ EDGES = {
     ),
     "arrives where it spawns": build_episode([Agent(positions=[(0, 0)], goal=(0.3, 0))], [standing((1, 0), 2)]),
     "one step": build_episode([Agent(positions=EAST[:2])], [standing((1, 0), 3)]),
+    "overtaken": build_episode([Agent(positions=EAST)], [Pedestrian(positions=line((-1.5, 0), (6.5, 0), 20))]),
     "two steps": build_episode([Agent(positions=EAST[:3])], [standing((1, 0), 3)]),
     "slow": build_episode([Agent(positions=line((0, 0), (8, 0), 140), goal=(9, 0), outcome=Outcome.TIMED_OUT)]),
     "round a corner": build_episode([Agent(positions=[*line((0, 0), (3, 0), 6), *line((3, 0.5), (3, 4), 7)])]),

@@ -1,13 +1,18 @@
-"""What an agent costs the people around it, if they react: metres off their recorded tracks, and seconds of delay."""
+"""What an agent costs the people around it: the braking it leaves to them and, if they react, way and time."""
 
 import numpy as np
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.geometry import Array
-from socialnav_mj.metrics.metric import Better, Metric, Need
+from socialnav_mj.metrics.metric import Better, Kind, Metric, Need
 from socialnav_mj.metrics.missing import NO_STEP
-from socialnav_mj.metrics.pairs import pairs
+from socialnav_mj.metrics.pairs import pairs, radii
+from socialnav_mj.metrics.time_to_collision import disc_contact_time
 
+COMFORTABLE_BRAKING = 1.0
+"""Braked with this, somebody who walks at 1.3 m/s stops within 0.85 m, a long step; harder is a start [m/s^2]."""
+BRAKING_HORIZON = 4.0
+"""Collisions farther ahead are nobody's concern yet [s]."""
 SLOWEST_WALK = 0.5
 """Delays are told at this speed at least, so that who stands is not late without end [m/s]."""
 
@@ -47,6 +52,33 @@ def delay_imposed(episode: Episode) -> Array:
     return _charged(episode, behind / np.maximum(speed, SLOWEST_WALK))
 
 
+def braking_imposed(episode: Episode) -> Array:
+    """Active steps in which an agent leaves it to somebody to brake hard.
+
+    Both keep their velocities, and their discs would touch within `BRAKING_HORIZON`. The person can take min(w, c) out
+    of the approach, w being its own speed along the line of centres and c the speed at which the gap g closes, for
+    which it has to brake with min(w, c)^2 / (2 g). A step counts once if that is more than `COMFORTABLE_BRAKING` for
+    anybody, or if they touch while the person walks on towards the agent.
+
+    Args:
+        episode: Record with the tracks of agents and pedestrians; its scenario gives the radii.
+
+    Returns:
+        Shape (n_agents,); whole numbers, NaN for agents without an active step.
+    """
+    here, distance = pairs(episode), sum(radii(episode))
+    away = here.offset / np.maximum(here.distance, 1e-9)[:, None]
+    closing = -np.einsum("kd,kd->k", here.velocity, away)
+    own = -np.einsum("kd,kd->k", episode.pedestrian_velocity[here.step, here.pedestrian], away)
+    gap = here.distance - distance
+    taken = np.maximum(np.minimum(own, closing), 0.0)
+    hard = taken**2 > 2.0 * COMFORTABLE_BRAKING * np.maximum(gap, 0.0)
+    hard &= here.active & (disc_contact_time(here.offset, here.velocity, distance) <= BRAKING_HORIZON)
+    steps = np.zeros(episode.agent_active.shape, dtype=bool)
+    steps[here.step[hard], here.agent[hard]] = True
+    return np.where(episode.agent_active.any(axis=0), steps.sum(axis=0).astype(float), np.nan)
+
+
 def _deviation(episode: Episode) -> Array:
     """(t, m, 2), zeros if everybody keeps to the recording."""
     off = episode.pedestrian_deviation
@@ -72,6 +104,21 @@ def _charged(episode: Episode, amount: Array) -> Array:
 
 
 METRICS = (
+    Metric(
+        name="braking_imposed",
+        function=braking_imposed,
+        formula="steps (*rate*) with somebody on collision course within 4 s who would have to brake with more than "
+        "1 m/s^2: min(w, c)^2 / (2 g), w the person's speed towards the agent, c the speed at which the gap g closes",
+        better=Better.LESS,
+        missing=NO_STEP,
+        unit="steps",
+        kind=Kind.COUNT,
+        digits=1,
+        needs=(Need.POSITION, Need.VELOCITY, Need.PEDESTRIANS),
+        heading="imposed braking",
+        source="ours, after the deceleration rate to avoid a crash (Almqvist, Hyden and Risser 1991); people who "
+        "replay do not brake",
+    ),
     Metric(
         name="deviation_imposed",
         function=deviation_imposed,

@@ -25,6 +25,7 @@ MEASURES = (
     "collisions_pedestrian_by_agent",
     "collisions_pedestrian_by_both",
     "collisions_pedestrian_by_partner",
+    "braking_imposed",
     "timed_out",
     "average_speed",
     "struck_standing",

@@ -135,7 +135,8 @@ def _scenario(board: Board, scenario: str, costs: Mapping[str, float]) -> list[s
         rows[-1] += [number(costs.get(board.controllers[k], float("nan")), 2)] if costs else []
     rows.append([HUMAN, *_cells(board, scenario, HUMAN), *("-" for _ in RANKED), *(["-"] if costs else [])])
     heads = ["controller", "success", "steps within 1.2 m", "share of steps", "time, censored [s]"]
-    heads += ["hit first by a pedestrian / agent", "hits on people: agent / both / person", "timed out", "impact [N s]"]
+    heads += ["hit first by a pedestrian / agent", "hits on people: agent / both / person"]
+    heads += ["imposed braking [steps]", "timed out", "impact [N s]"]
     heads += ["ranks: success", "ranks: share of steps", "ranks: time"]
     return table([*heads, "cost"] if costs else heads, rows)
 
@@ -151,6 +152,7 @@ def _cells(board: Board, scenario: str, method: str) -> list[str]:
         mean_cell(find("time_under_way"), 1),
         f"{mean_cell(find('first_hit_pedestrian'), 3)} / {mean_cell(find('first_hit_agent'), 3)}",
         " / ".join(_hundred(find(f"collisions_pedestrian_by_{who}")) for who in ("agent", "both", "partner")),
+        mean_cell(find("braking_imposed"), 1),
         mean_cell(find("timed_out"), 3),
         mean_cell(find("largest_impact_impulse"), 1),
     ]
