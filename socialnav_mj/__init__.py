@@ -33,6 +33,13 @@ def load(
     return suite.load(task_name, task_kwargs, environment_kwargs, **keywords)
 
 
+def register_with_dm_control() -> None:
+    """Make `dm_control.suite.load("socialnav", "scenario_1")` work; see `socialnav_mj.suite`."""
+    from socialnav_mj import suite
+
+    suite.register_with_dm_control()
+
+
 def _choose_renderer() -> None:
     """Without a display dm_control's own choice, GLFW, cannot render: name a library that can before its import."""
     if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):

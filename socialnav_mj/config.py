@@ -170,7 +170,7 @@ class Scenario:
             self.control_timestep <= longest,
             "control_timestep",
             self.control_timestep,
-            f"at most {longest:.3g}, in which a robot at {self.robot.max_speed} m/s crosses its goal unseen",
+            f"at most {longest:.3g} s, or a robot at {self.robot.max_speed} m/s could cross its goal between two",
         )
         _require(
             self.max_yaw_rate <= MAX_YAW_RATE,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from socialnav_mj import suite
@@ -105,6 +106,8 @@ class Done:
     job: Job
     simulated_time: float | None = None
     """[s]; None if the episode was there already or failed."""
+    duration: float = 0.0
+    """Real time that it took in its process [s]."""
     error: str | None = None
     """What went wrong, and where."""
 
@@ -208,7 +211,7 @@ def _run_all(jobs: list[Job], folder: Path, n_jobs: int) -> Iterator[Done]:
 
 def _run(job: Job, folder: Path) -> Done:
     """Run one episode in whatever process; a failure is told, so that the others go on."""
-    evaluation = job.evaluation
+    evaluation, begin = job.evaluation, perf_counter()
     try:
         recording = recording_of(evaluation)
         scenario = _scenario(evaluation, job.scenario, job.draw)
@@ -222,7 +225,7 @@ def _run(job: Job, folder: Path) -> Done:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({frame.filename}:{frame.lineno})"
         return Done(job=job, error=text)
-    return Done(job=job, simulated_time=float(episode.time[-1]))
+    return Done(job=job, simulated_time=float(episode.time[-1]), duration=perf_counter() - begin)
 
 
 def recording_of(evaluation: Evaluation) -> Recording:

@@ -1,4 +1,4 @@
-"""Where the MJCF assets and the embedded data are, in a wheel, an editable install or a bare checkout."""
+"""Where the MJCF assets, the embedded data and the extras are, in a wheel, an editable install or a bare checkout."""
 
 from pathlib import Path
 
@@ -35,3 +35,18 @@ def data_folder() -> Path:
         FileNotFoundError: If the installation has none.
     """
     return _folder("data")
+
+
+def install_hint(extra: str) -> str:
+    """What to type for an extra that is missing.
+
+    Args:
+        extra: Its name in pyproject.toml.
+
+    Returns:
+        A command of pip: of the checkout where this is one, else of the package.
+    """
+    checkout = _PACKAGE.parent
+    if (checkout / "pyproject.toml").is_file():
+        return f"pip install -c {checkout / 'constraints.txt'} -e '{checkout}[{extra}]'"
+    return f"pip install 'socialnav-mj[{extra}]'"

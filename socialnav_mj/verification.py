@@ -104,6 +104,8 @@ def _verify(path: Path, dataset: str | None, data_dir: str | None, trust: Trust,
         if path.suffix == ".rrd":
             return _verify_trace(path, dataset, data_dir, trust, bounds)
         return _verify_episode(path, dataset, data_dir, trust, bounds)
+    except (ValueError, OSError) as error:
+        return Verdict(path=path, error=f"not checked: {error}")
     except Exception as error:  # noqa: BLE001  whatever a file makes happen, it is told and the others are verified
         return Verdict(path=path, error=f"{type(error).__name__}: {error}")
 
@@ -196,7 +198,7 @@ def _tables(folder: Path, trust: Trust, n_jobs: int) -> Iterator[Verdict]:
             return
         expected = report_tables(folder, metrics=metrics, n_jobs=n_jobs)
     except (ValueError, OSError) as error:
-        yield Verdict(path=folder / "report.md", error=f"{type(error).__name__}: {error}")
+        yield Verdict(path=folder / "report.md", error=f"not checked: {error}")
         return
     if not any((folder / name).exists() for name in expected):
         return

@@ -318,6 +318,8 @@ def test_json_gives_one_object_and_quiet_only_errors(capsys):
     assert shown.err == ""
     found = json.loads(shown.out)
     names = {(e["controller"], e["measure"]) for e in found["estimates"]}
+    (row, *_) = found["tables"][0]["rows"]
+    assert isinstance(row["touched a person"], float) and not any("\n" in heading for heading in row)
     assert ("go_straight", "success") in names and found["lines"][0].startswith("report: o/report.html")
     main(["verify", "o", "--dataset", TINY, "--jobs", "1", "--json", "--quiet"])
     assert all(file["same"] for file in json.loads(capsys.readouterr().out)["files"])
@@ -329,8 +331,11 @@ def test_json_gives_one_object_and_quiet_only_errors(capsys):
 def test_output_that_is_no_terminal_has_no_colours(capsys):
     main(["list"])
     main(["check", "go_straight"])
-    told = capsys.readouterr().out + fails(capsys, "report", "nowhere")
-    assert "\x1b" not in told
+    main([*QUICK, "--controllers", "go_straight", "--out", "o"])
+    shown = capsys.readouterr()
+    assert "\x1b" not in shown.out + shown.err + fails(capsys, "report", "nowhere")
+    # A bar is for terminals; others get lines.
+    assert "episodes 2/2\ntables and traces\n" in shown.err
 
 
 SPIN = """

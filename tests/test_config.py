@@ -72,7 +72,7 @@ def test_configuration_cannot_be_changed() -> None:
         ("goal_radius", float("inf"), "numbers > 0"),
         ("physics_timestep", None, r"numbers in \(0, 0\.02\]"),
         ("physics_timestep", 0.025, r"numbers in \(0, 0\.02\]"),
-        ("control_timestep", 100.0, r"at most 1, in which a robot at 1\.0 m/s crosses its goal unseen"),
+        ("control_timestep", 100.0, r"at most 1 s, or a robot at 1\.0 m/s could cross its goal between two"),
         ("control_timestep", 0.09, r"at least 0\.0988 with turn_limit = 'per_step', or a robot may turn at 5\.8 rad/s"),
         ("control_timestep", 0.205, r"whole multiples of physics_timestep = 0\.01"),
         ("control_timestep", 0.001, r"whole multiples of physics_timestep = 0\.01"),

@@ -331,6 +331,7 @@ def test_make_controller_takes_entry_points_of_installed_packages(monkeypatch):
     ("spec", "named"),
     [
         ("nobody", "unknown controller 'nobody'; available: potential_field"),
+        ("go_straigt", "unknown controller 'go_straigt'; did you mean go_straight?; available: "),
         ("no.such.module:Thing", "cannot be imported from 'no.such.module:Thing': No module named 'no'"),
         (f"{__name__}:Missing", "has no attribute 'Missing'"),
         (":Thing", "expected package.module:Class"),

@@ -222,17 +222,22 @@ def test_report_makes_all_but_the_episodes_again(run):
 
 
 def test_pace_counts_what_was_run_and_not_what_was_there(monkeypatch):
-    """Costs 2.5, 2.5 and 0.5 s: after 5 s for the first that was run, the rest of 0.5 s takes 1 s."""
-    now = iter([100.0, 101.0, 105.0, 105.0, 105.25, 200.0])
+    """Costs 2.5, 2.5, 2.5 and 0.5 s; those of `a` take as long as they cost, those of `b` four times as long."""
+    now = iter([100.0, 101.0, 105.0, 105.0, 110.0, 110.0, 110.5, 200.0, 210.0, 210.0])
     monkeypatch.setattr("socialnav_mj.cli.pace.monotonic", lambda: next(now))
     jobs = [
         Job(evaluation=wanted(), scenario="scenario_1", controller=controller, draw=draw)
-        for controller, draw in (("a", 0), ("a", 1), ("human", 0))
+        for controller, draw in (("a", 0), ("a", 1), ("b", 0), ("b", 1))
     ]
-    np.testing.assert_allclose([job.cost for job in jobs], [2.5, 2.5, 0.5])
+    np.testing.assert_allclose([job.cost for job in jobs], 2.5)
     pace = Pace(jobs)
-    pace.note(Done(job=jobs[0]))
+    pace.note(Done(job=jobs[0]))  # was there
     assert pace.rate is None and pace.left is None
-    pace.note(Done(job=jobs[1], simulated_time=200.0))
-    assert pace.rate == pytest.approx(40.0)
-    assert [pace.left, pace.left, pace.left] == pytest.approx([1.0, 0.75, 0.0])
+    pace.note(Done(job=jobs[1], simulated_time=200.0, duration=2.5))
+    assert pace.rate == pytest.approx(40.0) and pace.left == pytest.approx(5.0)  # b as a, one after the other
+    pace.note(Done(job=jobs[2], simulated_time=200.0, duration=10.0))
+    # 12.5 s of episodes in 10 s: 1.25 at once.
+    assert [pace.left, pace.left] == pytest.approx([10.0 / 1.25, 10.0 / 1.25 - 0.5])
+    assert pace.left is None  # it takes longer than thought, and nobody knows how long
+    pace.note(Done(job=jobs[3], simulated_time=200.0, duration=10.0))
+    assert pace.left == 0.0

@@ -60,6 +60,15 @@ def test_sound_controllers_pass_and_their_time_is_told() -> None:
     assert findings[-1].question.startswith("time") and " us (60 agents" in findings[-1].told
 
 
+def test_an_exception_of_the_controller_is_told_once() -> None:
+    def slip(action, seen):
+        raise NameError("name 'ahed' is not defined")
+
+    (finding,) = examine(lambda: Wrong(slip))
+    assert not finding.passed and "NameError: name 'ahed' is not defined (" in finding.told
+    assert finding.told.endswith("; the other questions were not asked")
+
+
 @pytest.mark.parametrize("question", BROKEN)
 def test_each_broken_promise_is_told_with_its_input(question: str) -> None:
     broken = [finding for finding in examine(lambda: Wrong(BROKEN[question])) if not finding.passed]

@@ -158,7 +158,8 @@ def test_doubts_name_the_probable_cause() -> None:
     )
     assert "--frame-rate" in speed and "pixels" in speed
     speed, distance = doubts(crowd(80.0, apart=24.0))
-    assert "80 m/s" in speed and distance.startswith("the nearest neighbour is 24 m away") and "--units" in distance
+    assert "80 m/s" in speed and "probably the positions are pixels or no metres" in speed
+    assert distance.startswith("the nearest neighbour is 24 m away") and "--units" in distance
     assert "nobody walks at 0.1 m/s or faster" in doubts(crowd(0.01))[0]
 
 

@@ -101,7 +101,16 @@ def test_what_is_no_trace_is_refused(tmp_path):
         traces_of(tmp_path / "x.rrd", tmp_path)
 
 
-def test_window_is_bound_to_this_machine(run, started):
+def test_without_a_display_the_browser_is_named_before_anything_starts(run, started, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(RuntimeError, match="no display for a window; --web shows the traces in a browser"):
+        View(path=run).run()
+    assert not started
+
+
+def test_window_is_bound_to_this_machine(run, started, monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":9")
     View(path=run, port=9124).run()
     (command,) = started
     assert command[command.index("--bind") + 1] == "127.0.0.1" and command[command.index("--port") + 1] == "9124"
@@ -112,7 +121,8 @@ def test_window_is_bound_to_this_machine(run, started):
 
 def test_viewer_that_fails_is_told(run, monkeypatch):
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=7))
-    with pytest.raises(RuntimeError, match="ended with exit code 7; without a display, try --web"):
+    monkeypatch.setenv("DISPLAY", ":9")
+    with pytest.raises(RuntimeError, match="ended with exit code 7; --web shows the traces in a browser"):
         View(path=run).run()
 
 

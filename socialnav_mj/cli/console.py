@@ -2,6 +2,8 @@
 
 import json
 from datetime import timedelta
+from math import isfinite
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -23,6 +25,10 @@ if TYPE_CHECKING:
 
     from socialnav_mj.cli.pace import Pace
     from socialnav_mj.evaluation import Done, Job
+
+
+_QUIET_TIME = 10.0
+"""Between two lines of progress where there is no terminal for a bar [s]."""
 
 
 class Results(Console):
@@ -71,10 +77,18 @@ class Results(Console):
 
 
 def _table_json(table: Table) -> dict[str, Any]:
-    headings = [str(column.header) for column in table.columns]
-    cells = ([str(cell) for cell in column.cells] for column in table.columns)
+    headings = [" ".join(str(column.header).split()) for column in table.columns]
+    cells = ([_number_or_text(str(cell)) for cell in column.cells] for column in table.columns)
     rows = [dict(zip(headings, row, strict=True)) for row in zip(*cells, strict=True)]
     return {"title": str(table.title or ""), "rows": rows}
+
+
+def _number_or_text(cell: str) -> float | str:
+    try:
+        value = float(cell)
+    except ValueError:
+        return cell
+    return value if isfinite(value) else cell
 
 
 console = Results()
@@ -105,9 +119,10 @@ class _PaceColumn(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         rate, left = self._pace.rate, self._pace.left
-        if rate is None or left is None:
+        if rate is None:
             return Text("")
-        return Text(f"{rate:.0f} x real time, {timedelta(seconds=round(left))} left", style="progress.remaining")
+        until = "-:--:--" if left is None else str(timedelta(seconds=round(left)))
+        return Text(f"{rate:.0f} x real time, {until} left", style="progress.remaining")
 
 
 def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
@@ -122,10 +137,14 @@ def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
         TimeElapsedColumn(),
         _PaceColumn(pace),
     )
-    with Progress(*columns, console=errors) as progress:
+    with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
         bar = progress.add_task("episodes", total=len(jobs))
-        for done in episodes:
+        said = monotonic()
+        for count, done in enumerate(episodes, start=1):
             pace.note(done)
             progress.update(bar, advance=1)
+            if not errors.is_terminal and (monotonic() - said >= _QUIET_TIME or count == len(jobs)):
+                said = monotonic()
+                say(f"episodes {count}/{len(jobs)}", errors)
             if done.error is not None:
                 say(f"{done.job.file_name}: {done.error}", failures if errors.quiet else progress.console, style="red")

@@ -13,6 +13,7 @@ from socialnav_mj.cli.settings import AttentionSettings, TrainingSettings
 from socialnav_mj.files import check_output
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
+from socialnav_mj.resources import install_hint
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +77,7 @@ class Train:
 
 
 def _needed(error: ImportError) -> str:
-    return f"training needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}"
+    return f"training needs the extra 'train' ({install_hint('train')}): {error}"
 
 
 def _folder(config: TrainingConfig | AttentionConfig) -> Path:

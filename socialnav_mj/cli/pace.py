@@ -1,5 +1,6 @@
 """How long a command will take."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from time import monotonic
 
@@ -16,8 +17,11 @@ class Pace:
             jobs: All that are to be run or there already.
         """
         self._begin = self._last = monotonic()
-        self._waiting = sum(job.cost for job in jobs)
-        self._finished = self._simulated = 0.0
+        self._waiting: dict[str, float] = defaultdict(float)
+        for job in jobs:
+            self._waiting[job.controller] += job.cost
+        self._finished: dict[str, tuple[float, float]] = {}
+        self._simulated = 0.0
 
     def note(self, done: Done) -> None:
         """Account for one job.
@@ -25,9 +29,11 @@ class Pace:
         Args:
             done: Of `evaluate`.
         """
-        self._waiting -= done.job.cost
+        controller = done.job.controller
+        self._waiting[controller] -= done.job.cost
         if done.simulated_time is not None:
-            self._finished += done.job.cost
+            cost, spent = self._finished.get(controller, (0.0, 0.0))
+            self._finished[controller] = cost + done.job.cost, spent + done.duration
             self._simulated += done.simulated_time
         self._last = monotonic()
 
@@ -38,8 +44,19 @@ class Pace:
 
     @property
     def left(self) -> float | None:
-        """Time to the end if the rest costs what the finished episodes did [s]; None before the first episode."""
+        """Time to the end if each controller's rest costs what its finished episodes did [s].
+
+        Controllers without one cost what the others do, in the mean. None before the first episode, and when the time
+        is over and the end is not there.
+        """
         if not self._finished:
             return None
-        total = (self._last - self._begin) * self._waiting / self._finished
-        return max(0.0, total - (monotonic() - self._last))
+        costs, times = (sum(values) for values in zip(*self._finished.values(), strict=True))
+        at_once = max(1.0, times / max(self._last - self._begin, 1e-6))
+        waiting = {name: cost for name, cost in self._waiting.items() if cost > 1e-6}
+        rates = {name: spent / cost for name, (cost, spent) in self._finished.items()}
+        total = sum(cost * rates.get(name, times / costs) for name, cost in waiting.items())
+        left = total / at_once - (monotonic() - self._last)
+        if not waiting:
+            return 0.0
+        return left if left > 0.0 else None

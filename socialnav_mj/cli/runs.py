@@ -94,6 +94,8 @@ class Evaluate:
         except ChangedError as error:
             raise ValueError(f"{error.told}; --again runs them anew, --keep keeps both") from error
         follow(episodes, jobs_of(evaluation))
+        if not errors.is_terminal:
+            say("tables and traces", errors)
         with errors.status("tables and traces"):
             report = write_report(out, metrics=self.metrics, n_jobs=self.jobs)
         show(report.estimates, own)
@@ -163,12 +165,13 @@ class Verify:
         checked, wrong = 0, 0
         files = []
         with counted_progress() as progress:
-            bar = progress.add_task("files", total=len(files_of(self.path)))
+            total = len(files_of(self.path))
+            bar = progress.add_task("files", total=total)
             for verdict in verify(
                 self.path, dataset=self.dataset, data_dir=data_dir, trust=trust, bounds=bounds, n_jobs=self.jobs
             ):
-                progress.advance(bar)
                 checked, wrong = checked + 1, wrong + (not verdict.same)
+                progress.update(bar, completed=checked, total=max(total, checked))  # tables come after the files
                 say(f"{verdict.path.name}: {_told(verdict)}")
                 told = {"differences": verdict.differences, "error": verdict.error}
                 files.append({"file": verdict.path.name, "same": verdict.same, **told})

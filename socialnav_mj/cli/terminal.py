@@ -40,9 +40,10 @@ def terminal_tables(estimates: Sequence[Estimate]) -> list[Table]:
     tables = []
     for (dataset, variant, scenario), rows in by_scenario(estimates):
         n_draws = max(row["success"].n_draws for _, row in rows)
+        spread = "± standard error" if n_draws > 1 else "no error: that takes more draws"
         table = Table(
             title=Text(f"{crowd_of(dataset, variant)}, {scenario}"),
-            caption=f"means over {n_draws} draw(s), ± standard error; times count time-outs",
+            caption=f"means over {n_draws} draw{'s' * (n_draws > 1)}, {spread}; times count time-outs",
             box=box.SIMPLE_HEAD,
             padding=0,
         )

@@ -1,6 +1,8 @@
 """The sub-commands that show episodes: `view` and `render`."""
 
+import os
 import subprocess
+import sys
 import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
@@ -45,10 +47,12 @@ class View:
     def _in_window(self, paths: list[Path]) -> None:
         from socialnav_mj.trace.start import viewer_command, viewer_environment
 
+        if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise RuntimeError("there is no display for a window; --web shows the traces in a browser")
         command = viewer_command(paths, web_port=None, port=self.port)
         code = subprocess.run(command, env=viewer_environment(), check=False).returncode
         if code:
-            raise RuntimeError(f"the viewer ended with exit code {code}; without a display, try --web")
+            raise RuntimeError(f"the viewer ended with exit code {code}; --web shows the traces in a browser")
 
 
 def traces_of(path: Path, folder: Path) -> list[Path]:
@@ -112,8 +116,9 @@ class Render:
     def run(self) -> None:
         """Draw frame by frame behind a bar."""
         from socialnav_mj.episode import Episode
-        from socialnav_mj.film.film import Shot, times_of, write_film
+        from socialnav_mj.film.film import Shot, film_library, times_of, write_film
 
+        film_library()  # what is missing is told before anything is read
         path = episode_of(self.path, self.episode)
         episode = Episode.load(path)
         targets = [self.out, *([self.out.with_suffix(".gif")] if self.gif and self.out.suffix != ".gif" else [])]

@@ -37,8 +37,10 @@ class Finding:
 
 
 class _BrokenError(Exception):
-    def __init__(self, told: str, observation: Observation | None = None) -> None:
+    def __init__(self, told: str, observation: Observation | None = None, *, raised: bool = False) -> None:
         super().__init__(told)
+        self.raised = raised
+        """Whether the controller itself raised an exception."""
         self.observation = None if observation is None else {key: value.copy() for key, value in observation.items()}
 
 
@@ -135,7 +137,7 @@ def examine(make: Callable[[], Controller], *, seed: int = 0) -> Iterator[Findin
         seed: Of the walks, and what `reset` is given.
 
     Yields:
-        A finding for each question, in the order of a table.
+        A finding for each question, in the order of a table; it ends with the first at which the controller raised.
     """
     walks, limits = _walks(seed), Limits.of(Scenario())
 
@@ -212,7 +214,10 @@ def examine(make: Callable[[], Controller], *, seed: int = 0) -> Iterator[Findin
         try:
             yield Finding(question=question, passed=True, told=answer())
         except _BrokenError as no:
-            yield Finding(question=question, passed=False, told=str(no), observation=no.observation)
+            told = f"{no}; the other questions were not asked" if no.raised else str(no)
+            yield Finding(question=question, passed=False, told=told, observation=no.observation)
+            if no.raised:
+                return
 
 
 def _actions(controller: Controller, walk: _Walk, limits: Limits, seed: int, steps: int) -> Array:
@@ -235,7 +240,9 @@ def _actions(controller: Controller, walk: _Walk, limits: Limits, seed: int, ste
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{frame.filename}:{frame.lineno}"
-        raise _BrokenError(f"walk {walk.name!r}: {type(error).__name__}: {error} ({place})", observation) from error
+        raise _BrokenError(
+            f"walk {walk.name!r}: {type(error).__name__}: {error} ({place})", observation, raised=True
+        ) from error
     return np.array(found)
 
 

@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Callable
 from dataclasses import Field, fields, is_dataclass
+from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -213,9 +214,10 @@ def factory_of(name: str) -> Callable[..., Controller]:
         if entry.name == name:
             return load(name, entry.value)
     module, dot, attribute = name.rpartition(".")
-    meant = f"; did you mean {module}:{attribute}?" if dot else ""
+    close = get_close_matches(name, available(), n=1)
+    meant = f"; did you mean {f'{module}:{attribute}' if dot else close[0]}?" if dot or close else ""
     raise ValueError(
-        f"unknown controller {name!r}; available: {', '.join(available())}, or package.module:Class{meant}"
+        f"unknown controller {name!r}{meant}; available: {', '.join(available())}, or package.module:Class"
     )
 
 

@@ -12,6 +12,7 @@ from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.features import FEATURE_SETS, N_FLAGS
 from socialnav_mj.features.seen import Flat, Nearest, Observer
 from socialnav_mj.geometry import Array, twist_of_wheel_speed
+from socialnav_mj.resources import install_hint
 
 PREFIX = "sb3:"
 """Of the specs of such controllers; the path follows."""
@@ -95,7 +96,7 @@ def _load(path: str) -> Any:
     try:
         from stable_baselines3.common.save_util import load_from_zip_file
     except ImportError as error:
-        raise PolicyError(f"{path} needs the extra 'train' (pip install 'socialnav-mj[train]'): {error}") from error
+        raise PolicyError(f"{path} needs the extra 'train' ({install_hint('train')}): {error}") from error
     try:
         data, parameters, _ = load_from_zip_file(path, device="cpu")
         assert data is not None

@@ -14,6 +14,7 @@ from socialnav_mj.episode import Episode
 from socialnav_mj.files import written_whole
 from socialnav_mj.film.marks import draw_marks
 from socialnav_mj.film.stage import Poses, Stage, poses_at
+from socialnav_mj.resources import install_hint
 
 Camera = Literal["follow", "oblique", "top"]
 Frame = NDArray[np.uint8]
@@ -134,6 +135,23 @@ def frames(episode: Episode, shot: Shot) -> Iterator[Frame]:
         renderer.close()
 
 
+def film_library() -> Any:
+    """The library that writes films, with its ffmpeg.
+
+    Returns:
+        imageio.v2.
+
+    Raises:
+        RuntimeError: If the extra `render` is missing.
+    """
+    try:
+        import imageio.v2 as imageio
+        import imageio_ffmpeg  # noqa: F401  imageio finds it by itself, and says less well that it is missing
+    except ImportError as error:
+        raise RuntimeError(f"films need the extra 'render': {install_hint('render')}") from error
+    return imageio
+
+
 def write_film(episode: Episode, shot: Shot, path: Path) -> Iterator[int]:
     """Write a film or, to a PNG, one frame; the file appears whole or not at all.
 
@@ -151,11 +169,7 @@ def write_film(episode: Episode, shot: Shot, path: Path) -> Iterator[int]:
     """
     if path.suffix not in ENDINGS:
         raise ValueError(f"{path.name} ends in {path.suffix!r}, which is not allowed; allowed: {', '.join(ENDINGS)}")
-    try:
-        import imageio.v2 as imageio
-        import imageio_ffmpeg  # noqa: F401  imageio finds it by itself, and says less well that it is missing
-    except ImportError as error:
-        raise RuntimeError("films need the extra 'render': pip install 'socialnav-mj[render]'") from error
+    imageio = film_library()
     with written_whole(path) as part:
         if path.suffix == ".png":
             times = times_of(shot, episode)

@@ -125,11 +125,16 @@ METRICS = (
         means=(
             Mean(
                 name="first_hit_pedestrian",
-                heading="hit first by a pedestrian",
+                heading="first collision with a pedestrian",
                 share_of="pedestrian",
-                narrow="hit by\npeople",
+                narrow="touched\na person",
             ),
-            Mean(name="first_hit_agent", heading="hit first by an agent", share_of="agent", narrow="hit by\nagent"),
+            Mean(
+                name="first_hit_agent",
+                heading="first collision with an agent",
+                share_of="agent",
+                narrow="touched\nan agent",
+            ),
         ),
         formula="kind of the first partner; -1: nobody",
     ),

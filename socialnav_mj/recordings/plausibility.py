@@ -9,6 +9,9 @@ from socialnav_mj.recordings.recording import Recording
 
 WALKING_SPEEDS = (0.5, 2.0)
 """Median speeds of people who walk lie between these [m/s]; of the UCY scenes 0.72 to 1.21."""
+FASTEST_RUN = 10.0
+"""Nobody runs faster for long; frame rates that are taken for others make people that fast less often than pixels do
+[m/s]."""
 FAR_NEIGHBOUR = 20.0
 """People whose nearest neighbour is farther than this, in the median, are no crowd [m]; students003: 0.74."""
 _LOOKS = 20
@@ -79,6 +82,11 @@ def doubts(recording: Recording) -> tuple[str, ...]:
     speed = walking_speed(recording)
     if np.isnan(speed):
         found.append(f"nobody walks at {MOVING_SPEED:g} m/s or faster; probably {rate} or the unit (--units) is wrong")
+    elif speed > FASTEST_RUN:
+        found.append(
+            f"people walk at {speed:.3g} m/s (median; usual are {low:g} to {high:g}); probably the positions are "
+            f"pixels or no metres (--units), or {rate} is wrong (--frame-rate sets it)"
+        )
     elif not low <= speed <= high:
         found.append(
             f"people walk at {speed:.3g} m/s (median; usual are {low:g} to {high:g}); probably {rate} is wrong "

@@ -45,10 +45,11 @@ collision is a row of `tables/collisions.parquet`.
 
 - **human**: the {{people}} themselves, each on its own track instead of the agent that replaced it, scored by \
 the same code. Their contacts come from geometry at the same radii. It is the row to compare with, not a target of 1.
-- **success**: arrived, and had no collision on the way, whoever was at fault; over all agents.
+- **success**: arrived, and had no collision on the way, whoever moved into whom; over all agents.
 - **success if ghosts count**: a person whose track begins on a robot passes through it as a ghost until clear, which \
 is no collision; here whoever overlapped one did not succeed.
-- **hit first by**: share of all agents whose first collision was with a pedestrian, or with another agent.
+- **first collision with**: share of all agents whose first collision was with a pedestrian, or with another agent, \
+whoever moved into whom.
 - **timed out**: share of all agents whose deadline passed; **overturned**: of those that ended on their side or back, \
 which fails and ends the trip.
 - **time of successes**: spawn to arrival, over successes alone. It flatters fragile controllers, whose successes are \

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report.intervals import LEAST
 from socialnav_mj.report.style import new_figure, save, style
 
 PANELS = (
@@ -46,7 +47,9 @@ def draw_paired(differences: Sequence[Estimate], folder: Path) -> list[Path]:
         handles, labels = figure.axes[0].get_legend_handles_labels()
         title = "Agents minus the people they replaced"  # above the legend: a title of the figure would lie under it
         figure.legend(handles, labels, loc="outside upper center", ncols=columns, title=title, title_fontsize=9.5)
-        figure.supxlabel("0: as the person itself; bars: 95 % interval over draws", fontsize=8.0)
+        barred = any(not math.isnan(e.low) for e in shown)
+        bars = "; bars: 95 % interval over draws" if barred else f"; no intervals for fewer than {LEAST} draws"
+        figure.supxlabel(f"0: as the person itself{bars}", fontsize=8.0)
         return save(figure, folder, "paired_humans")
 
 

@@ -73,8 +73,8 @@ def fault_section(agents: pa.Table, contacts: pa.Table, overlaps: dict[tuple[str
     Returns:
         Lines of Markdown.
     """
-    headings = ["scenario", "controller", "with people", "agent's fault", "person's fault", "both", "neither"]
-    headings += ["with agents", "one's fault", "both", "neither", "repeated", "struck standing"]
+    headings = ["scenario", "controller", "with people", "agent moved", "person moved", "both", "neither"]
+    headings += ["with agents", "one moved", "both", "neither", "repeated", "struck standing"]
     found = {tuple(labels.values()): columns for labels, columns, _ in groups(contacts)}
     rows: Rows = []
     for labels, columns, _ in groups(agents):

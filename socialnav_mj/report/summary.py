@@ -8,6 +8,7 @@ from typing import Any
 
 from socialnav_mj.report.agents import Source, scenario_configuration
 from socialnav_mj.report.estimates import Estimate
+from socialnav_mj.report.intervals import LEAST
 from socialnav_mj.report.results import Results
 
 SUMMARY_FORMAT = "socialnav_mj.summary/1"
@@ -64,6 +65,10 @@ def _warnings(sources: Sequence[Source]) -> list[str]:
     warnings = []
     if len(_distinct(s.metadata.get("versions", {}) for s in sources)) > 1:
         warnings.append("the episodes were made by different versions of the software")
+    draws_of = [len(list(group)) for _, group in groupby(sources, key=lambda s: s.group)]
+    if draws_of and min(draws_of) < LEAST:
+        many = "1 draw" if min(draws_of) == 1 else f"{min(draws_of)} draws"
+        warnings.append(f"{many}: intervals and ties are shown from {LEAST} draws on; --draws 10 says more")
     for scenario, group in groupby(sources, key=lambda s: s.group[:3]):
         draws: dict[str, list[int]] = {}
         for source in group:

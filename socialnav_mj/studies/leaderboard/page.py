@@ -135,7 +135,7 @@ def _scenario(board: Board, scenario: str, costs: Mapping[str, float]) -> list[s
         rows[-1] += [number(costs.get(board.controllers[k], float("nan")), 2)] if costs else []
     rows.append([HUMAN, *_cells(board, scenario, HUMAN), *("-" for _ in RANKED), *(["-"] if costs else [])])
     heads = ["controller", "success", "steps within 1.2 m", "share of steps", "time, censored [s]"]
-    heads += ["hit first by a pedestrian / agent", "hits on people: agent / both / person"]
+    heads += ["first collision with a pedestrian / agent", "hits on people: agent / both / person"]
     heads += ["imposed braking [steps]", "timed out", "impact [N s]"]
     heads += ["ranks: success", "ranks: share of steps", "ranks: time"]
     return table([*heads, "cost"] if costs else heads, rows)

@@ -15,7 +15,7 @@ from socialnav_mj.studies.panel import REPLAY_IRL
 _COLUMNS = (
     ("success", "success"),
     ("share of steps within 1.2 m", "intrusion_share_of_steps"),
-    ("hit first by a pedestrian", "first_hit_pedestrian"),
+    ("first collision with a pedestrian", "first_hit_pedestrian"),
     ("timed out", "timed_out"),
 )
 _HOW_TO_READ = f"""\

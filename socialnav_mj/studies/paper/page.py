@@ -19,7 +19,7 @@ from socialnav_mj.studies.paper.training_curves import training_table
 
 _COLUMNS = (
     ("success", "success", 3),
-    ("hit first by a pedestrian / agent", "first_hit_pedestrian", 3),
+    ("first collision with a pedestrian / agent", "first_hit_pedestrian", 3),
     ("timed out", "timed_out", 3),
     ("steps within 1.2 m", "intimate_intrusions", 1),
     ("share of steps within 1.2 m", "intrusion_share_of_steps", 3),

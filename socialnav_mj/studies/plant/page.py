@@ -143,5 +143,5 @@ def _scenario(own: Comparison, scenario: str) -> list[str]:
         rows.append([*cells, each("stopping_distance", 2)])
     heads = ["controller", f"success, {first.name}", *(f"difference, {other.name}" for other in others)]
     each_of = " / ".join(condition.name for condition in own.conditions)
-    heads += [f"time, censored [s]: {each_of}", "hit first by a pedestrian", "hit first by an agent"]
+    heads += [f"time, censored [s]: {each_of}", "first collision with a pedestrian", "with an agent"]
     return table([*heads, "tracking error [m]", "side slip [m/s]", "commands not met", "stopping distance [m]"], rows)
