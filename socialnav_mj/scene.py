@@ -82,30 +82,12 @@ def build_model(
     arena.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     _aim_cameras(arena, low=low, high=high)
 
-    for slot in range(n_agent_slots if n_robots is None else n_robots):
-        robot = robot_spec(_robot_file(scenario.robot, assets), scenario.robot)
-        robot.geom("bumper").size[0] = scenario.robot.radius
-        if scenario.floor_friction is not None:
-            for wheel in ("left_wheel", "right_wheel"):
-                robot.geom(wheel).friction[0] = scenario.floor_friction
-        robot.actuator("forward").ctrlrange = [0.0, scenario.robot.max_speed]
-        robot.actuator("yaw").ctrlrange = [-scenario.max_yaw_rate, scenario.max_yaw_rate]
-        for body in robot.bodies[1:]:
-            body.gravcomp = 1.0
-        robot.body("robot").sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # the physics lets parked ones sleep
-        arena.attach(robot, prefix=agent_name(slot), frame=_apart(arena, slot, row=0))
-    for slot in range(n_pedestrian_slots):
-        person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
-        person.geom("body").size[0] = scenario.pedestrian_radius
-        frame = _apart(arena, slot, row=1)
-        if scenario.pedestrian_body == "compliant":
-            person.body("pedestrian").mocap = False
-            frame = _carrier(arena, slot).add_frame()
-        arena.attach(person, prefix=pedestrian_name(slot), frame=frame)
     # What a slot needs that is in use, and when touches count: a copy of the physics has only the model to read.
     arena.nuser_geom = 2
-    for geom in arena.geoms:
-        geom.userdata = [geom.contype, geom.conaffinity]
+    _note_contacts(arena)
+    count = n_agent_slots if n_robots is None else n_robots
+    _attach_pool(arena, _robot(scenario, assets), prefix=AGENT_PREFIX, count=count, row=0)
+    _attach_pool(arena, _person(scenario, assets), prefix=PEDESTRIAN_PREFIX, count=n_pedestrian_slots, row=1)
     arena.add_numeric(name=REARM_TIME, data=[scenario.contact_rearm_time], size=1)
     arena.add_numeric(name=AGENT_SLOTS, data=[n_agent_slots], size=1)
     if scenario.plant == "unicycle":
@@ -115,21 +97,91 @@ def build_model(
     return model
 
 
-def _apart(arena: mujoco.MjSpec, slot: int, *, row: int) -> Any:
-    """Frame on the floor away from all others: in one heap a pool of 86 robots has 4600 contacts to be solved."""
-    return arena.worldbody.add_frame(pos=[2.0 * slot, 2.0 * row, 0.0])
+def _attach_pool(arena: mujoco.MjSpec, member: mujoco.MjSpec, *, prefix: str, count: int, row: int) -> None:
+    """Attach copies of a robot or person, apart on the floor: in one heap 86 robots have 4600 contacts to be solved.
+
+    What an attachment costs grows with the scene, so that tens and hundreds of them are put together first; their
+    names are made of a digit each. The model is the same as if they were attached one by one.
+
+    Args:
+        arena: Gets them.
+        member: Whose names begin with "/"; is not changed.
+        prefix: Of all names; three digits follow it.
+        count: How many.
+        row: Where they stand: those of another row are 2 m away.
+    """
+    blocks = [member]
+    while len(blocks) < 3 and count >= 10 ** len(blocks):
+        ten = mujoco.MjSpec()
+        for k in range(10):
+            place = ten.worldbody.add_frame(pos=[2.0 * 10 ** (len(blocks) - 1) * k, 0.0, 0.0])
+            ten.attach(blocks[-1].copy(), prefix=f"{k}", frame=place)
+        blocks.append(ten)
+    slot = 0
+    for power in reversed(range(len(blocks))):
+        size = 10**power
+        while slot + size <= count:
+            place = arena.worldbody.add_frame(pos=[2.0 * slot, 2.0 * row, 0.0])
+            arena.attach(blocks[power].copy(), prefix=f"{prefix}{slot // size:0{3 - power}d}", frame=place)
+            slot += size
 
 
-def _carrier(arena: mujoco.MjSpec, slot: int) -> Any:
-    """A body that slides along x and y and bears a person's mass; the person in it is turned by its quaternion."""
-    name = pedestrian_name(slot)
-    # The inertia is never felt: the body does not turn.
+def _robot(scenario: Scenario, assets: Path) -> mujoco.MjSpec:
+    """A robot for the pool."""
+    robot = robot_spec(_robot_file(scenario.robot, assets), scenario.robot)
+    robot.geom("bumper").size[0] = scenario.robot.radius
+    if scenario.floor_friction is not None:
+        for wheel in ("left_wheel", "right_wheel"):
+            robot.geom(wheel).friction[0] = scenario.floor_friction
+    robot.actuator("forward").ctrlrange = [0.0, scenario.robot.max_speed]
+    robot.actuator("yaw").ctrlrange = [-scenario.max_yaw_rate, scenario.max_yaw_rate]
+    for body in robot.bodies[1:]:
+        body.gravcomp = 1.0
+    robot.body("robot").sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER  # the physics lets parked ones sleep
+    return _member(robot)
+
+
+def _person(scenario: Scenario, assets: Path) -> mujoco.MjSpec:
+    """A person for the pool; one who yields is in a body that slides along x and y and bears a person's mass."""
+    person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
+    person.geom("body").size[0] = scenario.pedestrian_radius
+    if scenario.pedestrian_body == "rigid":
+        return _member(person)
+    person.body("pedestrian").mocap = False
+    whole = mujoco.MjSpec()
+    # The inertia is never felt: the body does not turn, but the person in it, by its quaternion.
     mass = {"explicitinertial": True, "mass": PERSON_MASS, "ipos": [0.0, 0.0, 0.9], "inertia": [10.0, 10.0, 1.0]}
-    carrier = arena.worldbody.add_body(name=f"{name}carrier", pos=[2.0 * slot, 2.0, 0.0], **mass)
+    carrier = whole.worldbody.add_body(name="/carrier", **mass)
     for axis, way in (("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0])):
-        carrier.add_joint(name=name + axis, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way)
+        carrier.add_joint(name=f"/{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way)
     carrier.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
-    return carrier
+    return _member(person, whole, carrier)
+
+
+def _member(spec: mujoco.MjSpec, whole: mujoco.MjSpec | None = None, body: Any = None) -> mujoco.MjSpec:
+    """What is attached many times: with "/" before all names, and without the classes, which are most of its memory."""
+    _note_contacts(spec)
+    _forget_classes(spec)
+    whole = mujoco.MjSpec() if whole is None else whole
+    whole.attach(spec, prefix="/", frame=(body or whole.worldbody).add_frame())
+    return whole
+
+
+def _note_contacts(spec: mujoco.MjSpec) -> None:
+    for geom in spec.geoms:
+        geom.userdata = [geom.contype, geom.conaffinity]
+
+
+def _forget_classes(spec: mujoco.MjSpec) -> None:
+    """Delete the default classes of a model that has been read: its elements have taken their values already."""
+    parts = (spec.geoms, spec.sites, spec.joints, spec.cameras, spec.lights, spec.actuators)
+    names = set()
+    for part in (part for kind in parts for part in kind):
+        names.add(part.classname.name)
+        part.classname = spec.default
+    for name in sorted(names - {spec.default.name}):
+        if (unused := spec.find_default(name)) is not None:
+            spec.delete(unused)
 
 
 def _robot_file(robot: Robot, assets: Path) -> Path:

@@ -125,3 +125,43 @@ def test_another_robot_is_read_from_its_file_and_its_tendons_are_checked(tmp_pat
     assert model.body_subtreemass[model.body("agent_001/robot").id] == pytest.approx(10.0)
     with pytest.raises(ValueError, match=r"yaw tendon's left_wheel coefficient is 0\.25, but"):
         model_of(Scenario(robot=Robot(model=str(bad))))
+
+
+def test_files_are_read_once_however_large_the_pools_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+    from_file = mujoco.MjSpec.from_file
+
+    def note(path: str) -> Any:
+        read.append(Path(path).name)
+        return from_file(path)
+
+    monkeypatch.setattr(mujoco.MjSpec, "from_file", staticmethod(note))
+    model_of(n_agents=13, n_pedestrians=25)
+    assert sorted(read) == ["arena.xml", "pedestrian.xml", "robot.xml"]
+
+
+def test_pools_put_together_of_blocks_are_in_the_order_of_their_slots() -> None:
+    for body in ("rigid", "compliant"):
+        model = model_of(Scenario(pedestrian_body=body), n_agents=123, n_pedestrians=112)
+        first = {"rigid": "pedestrian", "compliant": "carrier"}[body]
+        for name, row, count in ((agent_name, 0.0, 123), (pedestrian_name, 2.0, 112)):
+            bodies = [model.body(name(i) + ("robot" if name is agent_name else first)) for i in range(count)]
+            assert np.unique(np.diff([one.id for one in bodies])).tolist() == [
+                {agent_name: 3, pedestrian_name: 1 if body == "rigid" else 2}[name]
+            ]
+            np.testing.assert_array_equal([one.pos for one in bodies], [[2.0 * i, row, 0.0] for i in range(count)])
+        actuators = [model.actuator(i).name for i in range(model.nu)]
+        assert actuators == [agent_name(i) + what for i in range(123) for what in ("forward", "yaw")]
+
+
+def test_a_robot_whose_classes_are_nested_keeps_what_they_say(tmp_path: Path) -> None:
+    text = (assets_folder() / "robot.xml").read_text()
+    inner = '<default class="inner"><geom rgba="0.1 0.2 0.3 1"/></default>'
+    text = text.replace('<default class="caster">', f'<default class="caster">{inner}')
+    text = text.replace('name="front_caster" class="caster"', 'name="front_caster" class="inner"')
+    (tmp_path / "nested.xml").write_text(text)
+    model = model_of(Scenario(robot=Robot(model=str(tmp_path / "nested.xml"))))
+    for slot in range(3):
+        caster = model.geom(agent_name(slot) + "front_caster")
+        np.testing.assert_allclose(caster.rgba, [0.1, 0.2, 0.3, 1.0], rtol=1e-6)
+        assert (caster.size[0], caster.contype[0], caster.condim[0]) == (0.02, 1, 1)
