@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from socialnav_mj import benchmark
+from socialnav_mj import benchmark, growth
 from socialnav_mj.cli import main
 from socialnav_mj.config import SETTINGS
 from socialnav_mj.episode import read_header
@@ -518,6 +518,20 @@ def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
     assert cost["ratio_low"] <= cost["ratio"] <= cost["ratio_high"]
     assert cost["real_time_factor"] == pytest.approx(cost["simulated_time"] / cost["episode_cpu"])
     assert content["recording"]["name"] == "tiny" and "mujoco" in content["versions"]
+
+
+def test_bench_of_growth_sets_larger_crowds_beside_the_smallest(capsys, monkeypatch):
+    short = partial(growth.measure_growth, simulated_time=1.0)
+    monkeypatch.setattr(growth, "measure_growth", short)
+    main(["bench", "--growth", "9", "4", "--controller", "go_straight", "--out", "bench.json"])
+    out = capsys.readouterr().out
+    assert "agent-step" in out
+    rows = json.loads(Path("bench.json").read_text())["growth"]
+    assert [row["n_agents"] for row in rows] == [4, 9]
+    assert [row["agent_steps"] for row in rows] == [4 * 5, 9 * 5]  # all under way for the whole second
+    assert rows[0]["ratio"] == 1.0
+    assert rows[1]["ratio"] == pytest.approx(rows[1]["cost"] / rows[0]["cost"])
+    assert all(row["cost"] > row["physics_cost"] + row["act_cost"] > 0.0 for row in rows)
 
 
 def test_bench_of_controllers_sets_each_beside_the_physics_that_it_drives(capsys, monkeypatch):

@@ -75,6 +75,8 @@ class Bench:
     """Name, or package.module:Class, with settings if need be, as in `evaluate`."""
     controllers: tuple[str, ...] = ()
     """Controllers whose own cost for 60 agents is measured, in a made-up crowd; then no episodes are."""
+    growth: tuple[int, ...] = ()
+    """Sizes of made-up crowds of robots in which an agent-step is measured, once each; then no episodes are."""
     seed: int = 0
     """Seed of the draw."""
     repetitions: int = 3
@@ -83,11 +85,36 @@ class Bench:
     """JSON file to write, with package versions and the recording's checksum."""
 
     def run(self) -> None:
-        """Measure scenarios, or controllers if some are named, print a table, and write the file if one is named."""
-        if self.controllers:
+        """Measure scenarios, controllers or growth, print a table, and write the file if one is named."""
+        if self.growth:
+            self._measure_growth()
+        elif self.controllers:
             self._measure_controllers()
         else:
             self._measure_episodes()
+
+    def _measure_growth(self) -> None:
+        from socialnav_mj.growth import measure_growth
+
+        with errors.status(f"{max(self.growth)} robots"):
+            rows = measure_growth(self.growth, controller=self.controller)
+        table = Table(title=f"{self.controller}, CPU time on one core", title_justify="left")
+        for heading in (
+            "robots",
+            "build [s]",
+            "agent-step [us]",
+            "physics [us]",
+            "controller [us]",
+            "ratio",
+            "peak [MB]",
+        ):
+            table.add_column(heading, justify="right")
+        for row in rows:
+            times = (f"{1e6 * seconds:.0f}" for seconds in (row.cost, row.physics_cost, row.act_cost))
+            ends = f"{row.ratio:.2f}", f"{row.peak_megabytes:.0f}"
+            table.add_row(f"{row.n_agents}", f"{row.build_cpu:.2f}", *times, *ends)
+        console.print(table)
+        self._write({"growth": [asdict(row) for row in rows]})
 
     def _measure_controllers(self) -> None:
         from socialnav_mj.benchmark import measure_controllers
