@@ -48,7 +48,7 @@ class _Watched:
 
     def __init__(self, controller: Controller) -> None:
         self.name, self.cpu, self._controller = controller.name, 0.0, controller
-        self.neighbours = getattr(controller, "neighbours", None)
+        self.sees_nearest = getattr(controller, "sees_nearest", None)
 
     def reset(self, limits: Limits, *, seed: int = 0) -> None:
         self._controller.reset(limits, seed=seed)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from socialnav_mj.cast import NOBODY
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller, Limits, controller_config
+from socialnav_mj.controllers.base import neighbours_of
 from socialnav_mj.episode import Array, Episode
 from socialnav_mj.provenance import episode_metadata
 from socialnav_mj.recorder import Recorder
@@ -44,6 +45,7 @@ def rollout(
     scenario: Scenario = task.scenario
     configuration = controller_config(controller)  # before anything adds to its attributes
     controller.reset(Limits.of(scenario), seed=scenario.seed)
+    task.neighbours = neighbours_of(controller)
     recorder = Recorder(task)
     digest = hashlib.sha256()
     time_step = environment.reset()

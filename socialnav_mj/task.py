@@ -15,7 +15,7 @@ from socialnav_mj.crowd import crowd_of
 from socialnav_mj.entrance import AgentQueue, Ghosts, is_free
 from socialnav_mj.episode import IntArray, Outcome
 from socialnav_mj.geometry import Array
-from socialnav_mj.observation import observe
+from socialnav_mj.observation import Neighbours, observe
 from socialnav_mj.outcome import OVERTURNED_TILT
 from socialnav_mj.physics import Physics
 from socialnav_mj.reaction import Movers
@@ -60,6 +60,8 @@ class CrowdTask(base.Task):
         self.scenario = scenario
         self.cast: Cast = cast_recording(recording, scenario, replaced=replaced)
         self._crowd = crowd_of(recording, scenario, self.cast)
+        self.neighbours: Neighbours | None = None
+        """How many of the nearest an agent is shown, and how near; None for all. See `socialnav_mj.observation`."""
         self._clear()
 
     def _clear(self) -> None:
@@ -193,6 +195,7 @@ class CrowdTask(base.Task):
                 pedestrian_position=people.position,
                 pedestrian_velocity=people.velocity,
                 pedestrian_slots=people.present,
+                neighbours=self.neighbours,
             )
         )
 

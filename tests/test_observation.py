@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from scenes import busy_crowd, environment_of, unit_vector
 
-from socialnav_mj.controllers import GoStraight, Limits
-from socialnav_mj.observation import observe
+from socialnav_mj.config import Scenario
+from socialnav_mj.controllers import GoStraight, Limits, PotentialField
+from socialnav_mj.controllers.base import neighbours_of
+from socialnav_mj.environment import build_environment
+from socialnav_mj.growth import walking_crowd
+from socialnav_mj.observation import FULL_BELOW, nearest, observe
+from socialnav_mj.rollout import rollout
 
 WORLD = ("position", "heading")
 """Keys that name places and directions of the world; all others are the agents' own view."""
@@ -160,3 +165,101 @@ def test_observation_of_a_run_agrees_with_the_truth_of_the_physics() -> None:
             seen_people, seen_agents = seen_people + len(shown), seen_agents + int(others.sum())
         time_step = environment.step(controller.act(seen))
     assert seen_people > 50 and seen_agents > 50
+
+
+def large_scene(n: int, m: int) -> dict[str, Any]:
+    """People and agents at about one a square metre, of whom some are not there."""
+    random = np.random.default_rng(3)
+    there = np.flatnonzero(random.random(m) < 0.9)
+    people = np.full((2, m, 2), np.nan)
+    people[:, there] = random.uniform(0.0, 10.0, (2, len(there), 2))
+    return {
+        **scene(n=n, m=m),
+        "active": random.random(n) < 0.9,
+        "position": random.uniform(0.0, 10.0, (n, 2)),
+        "pedestrian_position": people[0],
+        "pedestrian_velocity": people[1],
+        "pedestrian_slots": there,
+    }
+
+
+def test_nearest_are_those_that_sorting_all_distances_gives() -> None:
+    random = np.random.default_rng(0)
+    here, others = random.uniform(0.0, 5.0, (40, 2)), random.uniform(0.0, 5.0, (60, 2))
+    others[7] = others[3]  # equally near to everybody
+    for among_them, whom in ((False, others), (True, here)):
+        chosen, there = nearest(here, whom, (6, 1.0), among_them=among_them)
+        assert chosen.shape == there.shape == (40, 6)
+        for i in range(40):
+            distance = np.hypot(*(whom - here[i]).T)
+            order = [
+                j for j in np.argsort(distance, kind="stable") if distance[j] < 1.0 and not (among_them and i == j)
+            ]
+            assert chosen[i][there[i]].tolist() == order[:6]
+            assert there[i].tolist() == [True] * min(len(order), 6) + [False] * max(6 - len(order), 0)
+    chosen, there = nearest(here, np.zeros((0, 2)), (6, 1.0), among_them=False)
+    assert chosen.shape == (40, 6) and not there.any()
+
+
+def test_nearest_neighbours_are_a_part_of_the_full_arrays() -> None:
+    given = large_scene(FULL_BELOW + 10, FULL_BELOW + 30)
+    full, near = observe(**given), observe(**given, neighbours=(5, 1.2))
+    assert near["agent_position"].shape == near["pedestrian_velocity"].shape == (110, 5, 2)
+    for kind in ("agent", "pedestrian"):
+        seen = 0
+        for i in range(110):
+            distance = np.where(full[f"{kind}_mask"][i], np.hypot(*full[f"{kind}_position"][i].T), np.inf)
+            wanted = [j for j in np.argsort(distance, kind="stable")[:5] if distance[j] < 1.2]
+            mask = near[f"{kind}_mask"][i]
+            assert mask.sum() == len(wanted)
+            for what in ("position", "velocity"):
+                np.testing.assert_array_equal(near[f"{kind}_{what}"][i][mask], full[f"{kind}_{what}"][i][wanted])
+                assert not near[f"{kind}_{what}"][i][~mask].any()
+            seen += len(wanted)
+        assert 110 < seen < 5 * 110
+    for name in full.keys() - {
+        f"{kind}_{what}" for kind in ("agent", "pedestrian") for what in ("position", "velocity", "mask")
+    }:
+        np.testing.assert_array_equal(near[name], full[name])
+
+
+def test_below_100_slots_everybody_is_shown_whatever_is_asked_for() -> None:
+    given = large_scene(FULL_BELOW - 1, FULL_BELOW - 1)
+    for name, value in observe(**given).items():
+        np.testing.assert_array_equal(observe(**given, neighbours=(5, 1.2))[name], value)
+
+
+def test_potential_field_is_pushed_by_its_neighbours_as_by_everybody() -> None:
+    given, field = large_scene(FULL_BELOW, FULL_BELOW), PotentialField()
+    everybody, near = observe(**given), observe(**given, neighbours=field.sees_nearest)
+    assert near["agent_mask"].shape == (100, 32)
+    np.testing.assert_allclose(field.force(near), field.force(everybody), rtol=1e-9, atol=1e-12)
+
+
+def test_rollout_shows_a_controller_whom_it_asks_for_and_the_next_one_everybody() -> None:
+    class Short(GoStraight):
+        sees_nearest = (3, 2.0)
+
+        def act(self, observation: Any) -> Any:
+            shapes.append(observation["agent_position"].shape)
+            return super().act(observation)
+
+    class Tall(Short):
+        sees_nearest = None
+
+    environment = build_environment(walking_crowd(FULL_BELOW), Scenario(share=1.0), time_limit=0.3)
+    shapes: list[tuple[int, ...]] = []
+    rollout(environment, Short())
+    rollout(environment, Tall())
+    assert shapes == [(100, 3, 2)] * (len(shapes) // 2) + [(100, 100, 2)] * (len(shapes) // 2)
+
+
+@pytest.mark.parametrize("wrong", [(0, 1.0), (3, 0.0), 5, (3,), ("3", 1.0)])
+def test_a_wrong_request_for_neighbours_is_refused_with_what_is_allowed(wrong: Any) -> None:
+    class Wrong(GoStraight):
+        sees_nearest = wrong
+
+    with pytest.raises(
+        ValueError, match=r"sees_nearest = .* of controller 'go_straight'; allowed: None, or \(k, radius\)"
+    ):
+        neighbours_of(Wrong())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
+from socialnav_mj.observation import Neighbours
 
 Observation = Mapping[str, NDArray[Any]]
 
@@ -137,6 +138,30 @@ class Controller(Protocol):
         """Wheel speeds (left, right), shape (n_agents, 2) [rad/s]."""
 
 
+def neighbours_of(controller: Controller) -> Neighbours | None:
+    """Whom a controller asks to see.
+
+    Args:
+        controller: Its attribute `sees_nearest`, if it has one, is (k, radius): the k nearest within that radius.
+
+    Returns:
+        k and the radius [m]; None for everybody.
+
+    Raises:
+        ValueError: If it is something else.
+    """
+    match getattr(controller, "sees_nearest", None):
+        case None:
+            return None
+        case (int(count), int(radius) | float(radius)) if count >= 1 and radius > 0.0:
+            return count, float(radius)
+        case other:
+            raise ValueError(
+                f"sees_nearest = {other!r} of controller {controller.name!r}; allowed: None, or (k, radius) with a "
+                f"whole number k >= 1 and a radius > 0 [m]"
+            )
+
+
 class TwistController(ABC):
     """Base of controllers that think in twists: limits and wheel mapping are done here.
 
@@ -156,6 +181,11 @@ class TwistController(ABC):
     @property
     def active_policy(self) -> NDArray[np.int64] | None:
         """Index into `policies` of what chose each row of the last action, shape (n_agents,); None means 0."""
+        return None
+
+    @property
+    def sees_nearest(self) -> Neighbours | None:
+        """(k, radius [m]) if the k nearest within a radius are enough in a large crowd; None for everybody."""
         return None
 
     @property

@@ -1,7 +1,7 @@
 """Potential field (paper section III-B; Khatib 1986, doi 10.1177/027836498600500106)."""
 
 from dataclasses import dataclass
-from math import isfinite
+from math import ceil, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 from socialnav_mj.controllers.base import Observation, TwistController
 from socialnav_mj.elementary import arctan2
 from socialnav_mj.geometry import Array
+from socialnav_mj.observation import Neighbours
 
 MINIMUM_DISTANCE = 0.05
 """Distances below this repel like this one, which keeps the force finite [m]."""
 MINIMUM_TURN = 1e-3
 """Least turn that eq 7 divides by, as a share of pi; below pi times this the speed is at its limit anyway."""
+
+NEIGHBOURS = 8.0
+"""Most that are asked for in large crowds, times the influence distance squared: 2.5 in a square metre [1/m^2]."""
 
 _USED = ("goal", "twist", "pedestrian_position", "pedestrian_mask", "agent_position", "agent_mask")
 
@@ -119,6 +123,11 @@ class PotentialField(TwistController):
         _require_number("influence_distance", self.influence_distance, zero_allowed=False)
         if self.attraction_limit is not None:
             _require_number("attraction_limit", self.attraction_limit, zero_allowed=False, or_else=", None")
+
+    @property
+    def sees_nearest(self) -> Neighbours:
+        """Whoever is beyond the influence distance pushes nothing."""
+        return ceil(NEIGHBOURS * self.influence_distance**2), self.influence_distance
 
     def force(self, observation: Observation) -> Array:
         """Total force in the agent's frame (paper eq 6).
