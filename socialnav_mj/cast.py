@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.episode import IntArray
@@ -17,6 +18,9 @@ NOBODY = -1
 
 LIKELY_TIME = 1.6
 """With it a pool fits the controllers of the project on students003: 48 robots in scenario 4 where 42 are used [-]."""
+
+WINDOW = 250
+"""Control steps that a replay evaluates at once: 50 s, three times as long as people are there on the average."""
 
 _GRID_TOLERANCE = 1e-6
 """Times this near a control step, as a share of it, are on it."""
@@ -153,41 +157,82 @@ class SlotCrowd:
     """Slots that do not hold whom they held at the step before, shape (k,)."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Window:
+    """The people at w control steps on end and at one more before and after them, a row each, c physics steps long."""
+
+    begin: int
+    """Control step of the first row."""
+    pedestrian: IntArray
+    """(w + 2, n_slots), see `SlotCrowd`."""
+    position: Array
+    """((w + 2) c, n_slots, 2), NaN where nobody is [m]."""
+    velocity: Array
+    """((w + 2) c, n_slots, 2) [m/s]."""
+    heading: Array
+    """(w + 2, n_slots) [rad]."""
+    quaternion: Array
+    """(w + 2, n_slots, 4)"""
+    changed: NDArray[np.bool_]
+    """(w + 2, n_slots) whether somebody else was there at the step before; the first row is not set."""
+
+
 class Replay:
-    """How the pedestrians of a cast move, evaluated once at every physics step.
+    """How the pedestrians of a cast move, evaluated at every physics step, some seconds at a time.
 
     Who is in the scene at a control step stays until the next: a person whose track ends in between waits at its end.
+    No number depends on where a window begins, and none is kept for long: the memory does not grow with the recording.
     """
 
     def __init__(self, recording: Recording, scenario: Scenario, cast: Cast) -> None:
-        """Evaluate the tracks of all pedestrians from the first frame to the last pedestrian's end.
+        """Evaluate nothing yet.
 
         Args:
-            recording: Its tracks are evaluated here, and not asked again.
+            recording: Its tracks are evaluated when they are asked for.
             scenario: Gives the control and the physics time step.
             cast: Of this recording and scenario; says who is replayed, in which slot, from when to when.
         """
-        self._count = count = scenario.n_sub_steps
+        self._count = scenario.n_sub_steps
         self._timestep, self._yield = scenario.physics_timestep, scenario.pedestrian_body == "compliant"
-        slots = cast.n_pedestrian_slots
-        self._steps = steps = int(cast.pedestrian_last_step.max(initial=-1)) + 1
-        # One row more than there are control steps: an empty scene, for all the time after.
-        self._pedestrian = np.full((steps + 1, slots), NOBODY, dtype=np.int64)
-        self._position = np.full(((steps + 1) * count, slots, 2), np.nan)
-        self._velocity = np.full_like(self._position, np.nan)
-        self._heading = np.full((steps + 1, slots), np.nan)
-        for i, slot in enumerate(cast.pedestrian_slot):
-            first, end = int(cast.pedestrian_first_step[i]), int(cast.pedestrian_last_step[i]) + 1
-            fine = slice(first * count, end * count)
-            times = np.arange(fine.start, fine.stop) * scenario.physics_timestep
-            position, velocity, heading = recording.person(int(cast.pedestrian_index[i])).at(times)
-            self._pedestrian[first:end, slot] = i
-            self._position[fine, slot], self._velocity[fine, slot] = position, velocity
-            self._heading[first:end, slot] = heading[::count]
-        self._quaternion = quaternion_of_yaw(self._heading)
-        self._present = [np.flatnonzero(row != NOBODY) for row in self._pedestrian]
-        before = np.concatenate([np.full((1, slots), NOBODY), self._pedestrian[:-1]])
-        self._changed = [np.flatnonzero(row) for row in self._pedestrian != before]
+        self._recording, self._cast = recording, cast
+        # After the last person's end comes one more step, an empty scene, for all the time after.
+        self._steps = int(cast.pedestrian_last_step.max(initial=-1)) + 1
+        self._windows: dict[int, _Window] = {}
+
+    def _window_of(self, step: int) -> tuple[_Window, int]:
+        """The window that a control step is in, and its row there; of the others the latest is kept."""
+        number = step // WINDOW
+        if number not in self._windows:
+            self._windows = dict([*self._windows.items()][-1:])
+            self._windows[number] = self._evaluated(number * WINDOW - 1)
+        window = self._windows[number]
+        return window, step - window.begin
+
+    def _evaluated(self, begin: int) -> _Window:
+        count, slots, rows = self._count, self._cast.n_pedestrian_slots, WINDOW + 2
+        pedestrian = np.full((rows, slots), NOBODY, dtype=np.int64)
+        position, heading = np.full((rows * count, slots, 2), np.nan), np.full((rows, slots), np.nan)
+        velocity = np.full_like(position, np.nan)
+        first, last = self._cast.pedestrian_first_step, self._cast.pedestrian_last_step
+        for i in np.flatnonzero((first < begin + rows) & (last >= begin)):
+            slot, since, end = self._cast.pedestrian_slot[i], max(first[i], begin), min(last[i] + 1, begin + rows)
+            times = np.arange(since * count, end * count) * self._timestep
+            track = self._recording.person(int(self._cast.pedestrian_index[i])).at(times)
+            here, fine = slice(since - begin, end - begin), slice((since - begin) * count, (end - begin) * count)
+            pedestrian[here, slot] = i
+            position[fine, slot], velocity[fine, slot] = track[:2]
+            heading[here, slot] = track[2][::count]
+        changed = np.zeros(pedestrian.shape, dtype=bool)
+        changed[1:] = pedestrian[1:] != pedestrian[:-1]
+        return _Window(
+            begin=begin,
+            pedestrian=pedestrian,
+            position=position,
+            velocity=velocity,
+            heading=heading,
+            quaternion=quaternion_of_yaw(heading),
+            changed=changed,
+        )
 
     def crowd(self, step: int) -> SlotCrowd:
         """Everybody in the scene at a control step.
@@ -198,15 +243,17 @@ class Replay:
         Returns:
             A row for every pedestrian slot; its arrays are views of this object's and must not be written to.
         """
-        row = min(step, self._steps)
+        within = min(step, self._steps)
+        window, row = self._window_of(within)
+        pedestrian = window.pedestrian[row]
         return SlotCrowd(
-            pedestrian=self._pedestrian[row],
-            position=self._position[row * self._count],
-            velocity=self._velocity[row * self._count],
-            heading=self._heading[row],
-            quaternion=self._quaternion[row],
-            present=self._present[row],
-            changed=self._changed[row] if step == row else self._changed[row][:0],
+            pedestrian=pedestrian,
+            position=window.position[row * self._count],
+            velocity=window.velocity[row * self._count],
+            heading=window.heading[row],
+            quaternion=window.quaternion[row],
+            present=np.flatnonzero(pedestrian != NOBODY),
+            changed=np.flatnonzero(window.changed[row] & (step == within)),
         )
 
     def begin(self) -> None:
@@ -231,15 +278,14 @@ class Replay:
             Position [m] and velocity [m/s], both of shape (n_sub_steps, n_slots, 2); and for people who yield the mean
             velocity in the physics step before and in each, shape (n_sub_steps + 1, n_slots, 2), else None [m/s].
         """
-        step = min(step, self._steps)
-        rows = slice(step * self._count, (step + 1) * self._count)
-        return self._position[rows], self._velocity[rows], self._walk(step) if self._yield else None
+        window, row = self._window_of(min(step, self._steps))
+        rows = slice(row * self._count, (row + 1) * self._count)
+        return window.position[rows], window.velocity[rows], self._walk(window, row) if self._yield else None
 
-    def _walk(self, step: int) -> Array:
+    def _walk(self, window: _Window, row: int) -> Array:
         """Mean velocity from place to place; the recorded one where a person has just come, or is about to leave."""
-        first, end = step * self._count, (step + 1) * self._count
+        first, end = row * self._count, (row + 1) * self._count
         rows = np.arange(first - 1, end + 1)
-        there = rows.clip(0, len(self._position) - 1)
-        same = (self._pedestrian[there // self._count] == self._pedestrian[step]) & (there == rows)[:, None]
-        walk = np.diff(np.where(same[..., None], self._position[there], np.nan), axis=0) / self._timestep
-        return np.where(np.isnan(walk), self._velocity[rows[:-1].clip(first, end - 1)], walk)
+        same = window.pedestrian[rows // self._count] == window.pedestrian[row]
+        walk = np.diff(np.where(same[..., None], window.position[rows], np.nan), axis=0) / self._timestep
+        return np.where(np.isnan(walk), window.velocity[rows[:-1].clip(first, end - 1)], walk)

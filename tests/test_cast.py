@@ -1,5 +1,7 @@
 """Who is replaced and replayed, on which control steps and in which slots."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scenes import busy_crowd, recording_of, stand, walk
@@ -148,3 +150,40 @@ def test_mean_velocity_leads_from_place_to_place_within_a_control_step_and_into_
         absent = np.setdiff1d(np.arange(cast.n_pedestrian_slots), now.present)
         assert np.isnan(walk[:, absent]).all()
     assert met > 2
+
+
+@pytest.mark.parametrize("body", ["rigid", "compliant"])
+def test_no_bit_of_a_replay_depends_on_how_much_is_evaluated_at_once(
+    body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, scenario = crowd()[0], Scenario(share=0.4, pedestrian_body=body)
+    cast = cast_recording(recording, scenario)
+
+    def bytes_of(window: int) -> list[bytes]:
+        monkeypatch.setattr("socialnav_mj.cast.WINDOW", window)
+        replay, steps = Replay(recording, scenario, cast), int(cast.pedestrian_last_step.max()) + 4
+        # Back to the beginning, as at a reset, and across the edges of windows to and fro.
+        shown = [replay.crowd(step) for step in (*range(steps), 0, 14, 13, 14)]
+        moved = [array for step in range(steps) for array in replay.motion(step)]
+        arrays = [getattr(now, name) for now in shown for name in vars(now)] + [a for a in moved if a is not None]
+        return [np.ascontiguousarray(array).tobytes() for array in arrays]
+
+    assert bytes_of(7) == bytes_of(1) == bytes_of(10_000)
+
+
+def test_replay_of_a_long_recording_takes_no_more_memory_than_that_of_a_short_one() -> None:
+    def megabytes(minutes: int) -> float:
+        tracks = [walk([(0, 0), (10, 0)], 1.0, begin=9.0 * k) for k in range(60 * minutes // 9)]
+        recording, scenario = recording_of(*tracks), Scenario(share=0.01)
+        cast = cast_recording(recording, scenario)
+        assert recording.curves.start.size == len(tracks)  # the recording's own, made at first use
+        tracemalloc.start()
+        replay = Replay(recording, scenario, cast)
+        for step in range(int(cast.pedestrian_last_step.max())):
+            replay.crowd(step)
+            replay.motion(step)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peak / 1e6
+
+    assert megabytes(16) < 1.1 * megabytes(4)
