@@ -7,10 +7,13 @@ from numpy.typing import NDArray
 
 from socialnav_mj.cast import NOBODY, Cast
 from socialnav_mj.contact import Contact, contact_columns
-from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
+from socialnav_mj.episode import MAX_BYTES, Episode, EpisodeError, IntArray, Outcome, Partner
 from socialnav_mj.geometry import Array
 from socialnav_mj.recordings import Recording
 from socialnav_mj.task import CrowdTask
+
+_AGENT_BYTES, _PERSON_BYTES = 80, 40
+"""What a sample of an agent, and of a person, takes in the arrays of an episode, at least."""
 
 
 class Recorder:
@@ -28,7 +31,18 @@ class Recorder:
         self._people: list[tuple[IntArray, Array, Array]] = []
 
     def note_sample(self) -> None:
-        """Keep the state of every agent under way, at the reset and after every control step."""
+        """Keep the state of every agent under way, at the reset and after every control step.
+
+        Raises:
+            EpisodeError: If the record has grown larger than a file is allowed to be.
+        """
+        cast = self._task.cast
+        size = (len(self._samples) + 1) * (_AGENT_BYTES * cast.n_agents + _PERSON_BYTES * cast.n_pedestrians)
+        if size > MAX_BYTES:
+            raise EpisodeError(
+                f"at {self._task.time:.0f} s the record of {cast.n_agents} agents and {cast.n_pedestrians} people "
+                f"takes {size} bytes; allowed: up to {MAX_BYTES}. Run the recording in parts, with --since and --until"
+            )
         sample = self._task.sample
         slots = np.flatnonzero(sample.agent != NOBODY)
         self._samples.append(
@@ -118,11 +132,11 @@ class Recorder:
     def _pedestrians(self, time: Array) -> dict[str, NDArray[Any]]:
         """Motion of the people: the recording's, or what was noted of those who react or can be held back."""
         series = _pedestrian_series(self._task.recording, self._task.cast, time, self._task.scenario.control_timestep)
-        recorded = series["pedestrian_position"].copy()
+        recorded = series["pedestrian_position"].copy() if self._people else None
         for k, (pedestrian, position, velocity) in enumerate(self._people):
             series["pedestrian_position"][k, pedestrian] = position
             series["pedestrian_velocity"][k, pedestrian] = velocity
-        if self._people:
+        if recorded is not None:
             series["pedestrian_deviation"] = series["pedestrian_position"] - recorded
         return series
 

@@ -2,6 +2,7 @@
 
 import json
 import logging
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -233,3 +234,25 @@ def test_only_the_beginning_is_read_if_asked_for() -> None:
     assert load_recording(TINY / "tiny.txt", reading=Reading(until=99.0)).duration == whole.duration
     with pytest.raises(ValueError, match=r"until = -1\.0 is not allowed"):
         Reading(until=-1.0)
+
+
+def test_only_a_part_is_read_if_asked_for_and_parts_hold_what_the_whole_does() -> None:
+    whole = load_recording(TINY / "tiny.txt")
+    edges = [None, 1.0, 2.5, None]
+    times = np.arange(0.0, whole.duration, 0.1)
+    for since, until in pairwise(edges):
+        part = load_recording(TINY / "tiny.txt", reading=Reading(since=since, until=until))
+        assert part.reading == {k: v for k, v in (("since", since), ("until", until)) if v is not None}
+        begin, end = since or 0.0, until or whole.duration
+        assert part.duration <= end - begin + 1e-9 and part.variant == whole.variant
+        inside = times[(times > begin + 1e-6) & (times < end - 1e-6)]
+        then, there = whole.at(inside), part.at(inside - begin)
+        who = np.searchsorted(whole.ids, part.ids)
+        np.testing.assert_array_equal(there.present, then.present[:, who])
+        assert not np.delete(then.present, who, axis=1).any()
+        # Cut tracks are interpolated anew: near an edge the cubic is another one.
+        np.testing.assert_allclose(there.position, then.position[:, who], atol=0.05)
+    with pytest.raises(ValueError, match=r"until = 2 is not allowed; allowed: numbers > since = 3"):
+        Reading(since=3.0, until=2.0)
+    with pytest.raises(ValueError, match=r"nobody is there after 99 s.*an earlier --since"):
+        load_recording(TINY / "tiny.txt", reading=Reading(since=99.0))

@@ -8,10 +8,11 @@ import pytest
 from scenes import TINY, busy_crowd, environment_of, stand, walk
 
 import tasks
+from socialnav_mj import recorder
 from socialnav_mj.cast import cast_recording
 from socialnav_mj.controllers import GoStraight, PotentialField
 from socialnav_mj.environment import build_environment
-from socialnav_mj.episode import Episode, Outcome, Partner
+from socialnav_mj.episode import Episode, EpisodeError, Outcome, Partner
 from socialnav_mj.geometry import twist_of_wheel_speed
 from socialnav_mj.metrics import per_agent
 from socialnav_mj.rollout import rollout
@@ -288,3 +289,22 @@ def test_metadata_hold_the_resolved_configuration_as_json():
     assert metadata["recording"]["name"] == "tiny" and len(metadata["recording"]["checksum"]) == 64
     assert {"mujoco", "dm-control", "numpy", "socialnav-mj"} <= set(metadata["versions"])
     assert len(metadata["state_hash"]) == 64
+
+
+def test_a_record_that_no_file_may_hold_is_refused_when_it_has_grown_too_large(monkeypatch):
+    environment = busy()
+    n, m = environment.task.cast.n_agents, environment.task.cast.n_pedestrians
+    monkeypatch.setattr("socialnav_mj.recorder.MAX_BYTES", 10 * (80 * n + 40 * m))
+    with pytest.raises(EpisodeError, match=rf"at 2 s the record of {n} agents and {m} people.*--since and --until"):
+        rollout(environment, GoStraight())
+    assert environment.task.step == 10
+
+
+def test_the_size_at_which_a_record_is_refused_is_what_its_samples_take():
+    episode = rollout(busy(), GoStraight())
+    values = {field.name: getattr(episode, field.name) for field in fields(Episode)}
+    sampled = {name: v for name, v in values.items() if np.ndim(v) > 1 and len(v) == len(episode.time)}
+    agents = sum(v.nbytes for name, v in sampled.items() if name.startswith("agent"))
+    people = sum(v.nbytes for name, v in sampled.items() if name.startswith("pedestrian"))
+    assert agents == recorder._AGENT_BYTES * len(episode.time) * episode.n_agents
+    assert people == recorder._PERSON_BYTES * len(episode.time) * episode.n_pedestrians

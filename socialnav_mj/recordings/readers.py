@@ -129,12 +129,22 @@ def read_recording(
         checksum=sha256(files),
         reading=reading,
     )
-    if reading.until is None or reading.until >= recording.duration:
+    return _part(recording, files[0], reading)
+
+
+def _part(recording: Recording, path: Path, reading: Reading) -> Recording:
+    """What the reading leaves of a recording in time."""
+    whole = recording.duration
+    begin, end = reading.since or 0.0, whole if reading.until is None else min(reading.until, whole)
+    if (begin, end) == (0.0, whole):
         return recording
-    cut = window(recording, 0.0, reading.until / recording.duration)
+    if begin >= whole:
+        raise FormatError(path, None, f"nobody is there after {begin:g} s", "an earlier --since")
+    cut = window(recording, begin / whole, end / whole)
     if not cut.n_people:
-        raise FormatError(files[0], None, f"nobody is there before {reading.until:g} s", "a later --until")
-    return replace(cut, variant=variant)
+        given = f"nobody is there between {begin:g} and {end:g} s" if begin else f"nobody is there before {end:g} s"
+        raise FormatError(path, None, given, "an earlier --since or a later --until" if begin else "a later --until")
+    return replace(cut, variant=recording.variant)
 
 
 def _files_in_folder(folder: Path, variant: Variant | None, columns: Sequence[str]) -> tuple[Variant, tuple[Path, ...]]:

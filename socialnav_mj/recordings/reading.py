@@ -14,7 +14,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Length of named units [m]."""
 FRAME_RATES = (1e-3, 1e6)
 """Lowest and highest frame rate; beyond them times lose their precision [Hz]."""
-_SETTINGS = ("axis_order", "columns", "units", "until")
+_SETTINGS = ("axis_order", "columns", "since", "units", "until")
 LONGEST = 1e9
 """What the bounds on time can be lifted to; up to here a microsecond is told from the next [s]."""
 
@@ -44,6 +44,9 @@ class Reading:
     """Unit of the positions (of a vsp: of what its homography gives): m, cm, mm, or its length in metres."""
     axis_order: AxisOrder | None = None
     """Whether the homography of a vsp takes (x, y) or (y, x); by default what the catalogue states, else xy."""
+    since: float | None = None
+    """Read only what happens from then on, which becomes time 0; whoever is there then enters there; by default all
+    [s]."""
     until: float | None = None
     """Read only what happens before; whoever is there then leaves there; by default all [s]."""
     max_duration: float = 86400.0
@@ -55,8 +58,12 @@ class Reading:
         low, high = FRAME_RATES
         if self.frame_rate is not None:
             _require_number("frame_rate", self.frame_rate, low, high)
+        if self.since is not None:
+            _require_number("since", self.since, 0.0, LONGEST)
         if self.until is not None:
             _require_number("until", self.until, 0.0, LONGEST)
+            if self.since is not None and self.until <= self.since:
+                raise ValueError(f"until = {self.until:g} is not allowed; allowed: numbers > since = {self.since:g}")
         _require_number("max_duration", self.max_duration, 0.0, LONGEST)
         _require_number("max_gap", self.max_gap, 0.0, LONGEST)
         if self.axis_order not in (None, *get_args(AxisOrder)):
@@ -85,7 +92,7 @@ class Reading:
         """What changes the positions or who they belong to, apart from the frame rate, where it is not the default.
 
         Returns:
-            JSON values: some of axis_order, columns, units, until; `again` reads them back.
+            JSON values: some of axis_order, columns, since, units, until; `again` reads them back.
         """
         settings = {name: getattr(self, name) for name in _SETTINGS}
         return {
