@@ -32,8 +32,12 @@ class Cost:
     """[s]"""
     episode_cpu: float
     """From reset to the finished `Episode`: physics, contacts, observation, controller, record [s]."""
+    episode_cpus: tuple[float, ...]
+    """Of each repetition [s]."""
     physics_cpu: float
     """Bare `mj_step` calls from the same states, in a scene with no more robots than were in use at once [s]."""
+    physics_cpus: tuple[float, ...]
+    """Of each repetition [s]."""
     n_slots: int
     """Agents that deadlines let be in the scene at once."""
     n_robots: int
@@ -101,7 +105,9 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
         n_agents=episode.n_agents,
         simulated_time=float(episode.time[-1]),
         episode_cpu=median(episode_times),
+        episode_cpus=tuple(episode_times),
         physics_cpu=median(physics_times),
+        physics_cpus=tuple(physics_times),
         n_slots=environment.physics.n_agents,
         n_robots=environment.physics.model.nu // 2,
         n_used=n_used,
@@ -124,8 +130,12 @@ class ControllerCost:
     """Agents under way, the mean over control steps."""
     act_cpu: float
     """CPU time of `act` for an agent and control step, the median over repetitions [s]."""
+    act_cpus: tuple[float, ...]
+    """Of each repetition [s]."""
     physics_cpu: float
     """Of bare `mj_step` calls, from the states that it led to, for an agent and control step, the median [s]."""
+    physics_cpus: tuple[float, ...]
+    """Of each repetition [s]."""
     ratio: float
     """act_cpu / physics_cpu, the median of the ratios within each repetition."""
     ratio_low: float
@@ -173,7 +183,9 @@ def measure_controllers(
                 controller=spec,
                 n_agents=active / len(states),
                 act_cpu=median(acts),
+                act_cpus=tuple(acts),
                 physics_cpu=median(bare),
+                physics_cpus=tuple(bare),
                 ratio=median(ratios),
                 ratio_low=min(ratios),
                 ratio_high=max(ratios),

@@ -51,7 +51,7 @@ ROWS = (
     {"studies"},
     {"studies.paper", "studies.leave_one_out"},
     {"studies.gains", "studies.leaderboard", "studies.reaction", "studies.plant"},
-    {"benchmark", "growth", "resimulation", "verification", "cli", "__main__"},
+    {"benchmark", "growth", "comparison", "resimulation", "verification", "cli", "__main__"},
 )
 # A study uses what all studies share, and no other study.
 STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}

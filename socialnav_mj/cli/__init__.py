@@ -53,7 +53,7 @@ Command = (
 def main(args: list[str] | None = None) -> None:
     """Entry point; bad input ends in one clear message and exit code 2, an interruption in 128 + the signal's number.
 
-    1 means that `verify` or `check` found something. `--json` and `--quiet` may stand anywhere.
+    1 means that `verify`, `check` or `bench --compare` found something. `--json` and `--quiet` may stand anywhere.
 
     These are 130 for Ctrl-C, 143 for SIGTERM and 129 for SIGHUP.
 

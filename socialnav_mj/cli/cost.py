@@ -5,6 +5,7 @@ import shlex
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import median
 from typing import Annotated, Any
 
 import tyro
@@ -63,7 +64,10 @@ class StepSize:
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure what episodes, or controllers, cost on one core, beside bare `mj_step` calls, as ratios."""
+    """Measure what episodes, or controllers, cost on one core, beside bare `mj_step` calls, as ratios.
+
+    With --compare it measures nothing, and sets two files that it wrote side by side.
+    """
 
     dataset: str = "plaza"
     """Name in the catalogue, or path of a recording."""
@@ -83,10 +87,19 @@ class Bench:
     """Episodes and bare runs, in turn; the median is shown."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """JSON file to write, with package versions and the recording's checksum."""
+    compare: Annotated[tuple[Path, Path] | None, tyro.conf.arg(metavar="BEFORE AFTER", help_behavior_hint="")] = None
+    """Two such files to compare, of the same scenarios or controllers."""
+    at_most: Annotated[float | None, tyro.conf.arg(metavar="RATIO", help_behavior_hint="")] = None
+    """With --compare: exit code 1 if a figure is more than so many times what it was, beyond what repetitions differ
+    by."""
 
     def run(self) -> None:
-        """Measure scenarios, controllers or growth, print a table, and write the file if one is named."""
-        if self.growth:
+        """Measure scenarios, controllers or growth, or compare, print a table, and write the file if one is named."""
+        if self.at_most is not None and (self.compare is None or not self.at_most > 0.0):
+            raise ValueError(f"--at-most {self.at_most:g} is not allowed; allowed: numbers > 0, with --compare")
+        if self.compare is not None:
+            self._compare(*self.compare)
+        elif self.growth:
             self._measure_growth()
         elif self.controllers:
             self._measure_controllers()
@@ -116,6 +129,35 @@ class Bench:
         console.print(table)
         self._write({"growth": [asdict(row) for row in rows]})
 
+    def _compare(self, before: Path, after: Path) -> None:
+        from socialnav_mj.comparison import compare
+
+        found = compare(before, after)
+        table = Table(title=f"{after} beside {before}: medians (least to greatest repetition)", title_justify="left")
+        for heading in ("", "before", "after", "after / before", ""):
+            table.add_column(heading, justify="right" if heading else "left")
+        case = None
+        for change in found.changes:
+            if change.case != case:
+                table.add_section()
+                table.add_row(case := change.case)
+            ratio = f"{change.ratio:.2f}"
+            if (change.ratio_low, change.ratio_high) != (change.ratio, change.ratio):
+                ratio += f" ({change.ratio_low:.2f} to {change.ratio_high:.2f})"
+            sides = (f"{median(values):.4g}" for values in (change.before, change.after))
+            table.add_row(f"  {change.measure}", *sides, ratio, change.verdict)
+        console.print(table)
+        for note in found.notes:
+            say(f"not only the code differs: {note}")
+        if self.at_most is not None:
+            over = [change for change in found.changes if change.exceeds(self.at_most)]
+            for change in over:
+                say(
+                    f"{change.case}: {change.measure} is {change.ratio:.2f} times what it was; at most {self.at_most:g}"
+                )
+            if over:
+                sys.exit(1)
+
     def _measure_controllers(self) -> None:
         from socialnav_mj.benchmark import measure_controllers
 
@@ -131,7 +173,7 @@ class Bench:
             times = (f"{1e6 * seconds:.0f}" for seconds in (cost.act_cpu, cost.physics_cpu))
             table.add_row(cost.controller, f"{cost.n_agents:.0f}", *times, ratio)
         console.print(table)
-        self._write({"controllers": [asdict(cost) for cost in costs]})
+        self._write({"settings": {}, "controllers": [asdict(cost) for cost in costs]})
 
     def _measure_episodes(self) -> None:
         from socialnav_mj.benchmark import measure
@@ -171,13 +213,16 @@ class Bench:
         for label, cells in rows.items():
             table.add_row(label, *cells)
         console.print(table)
-        self._write({"recording": recording_metadata(recording), "costs": [asdict(cost) for cost in costs]})
+        settings = {"controller": self.controller, "seed": self.seed}
+        measured = {"settings": settings, "costs": [asdict(cost) for cost in costs]}
+        self._write({"recording": recording_metadata(recording), **measured})
 
     def _write(self, content: dict[str, Any]) -> None:
         """Write the measurements with the command and the versions, if a file is named."""
         from socialnav_mj.files import write_whole
-        from socialnav_mj.provenance import PACKAGES, package_versions
+        from socialnav_mj.provenance import PACKAGES, package_versions, platform_facts
 
         if self.out is not None:
-            whole = {"command": shlex.join(sys.argv), "versions": package_versions((*PACKAGES, "numba")), **content}
+            origin = {"versions": package_versions((*PACKAGES, "numba")), "platform": platform_facts()}
+            whole = {"command": shlex.join(sys.argv), **origin, **content}
             write_whole(self.out, (json.dumps(whole, indent=1) + "\n").encode())
