@@ -11,6 +11,8 @@ from typing import TypeVar
 
 from joblib import Parallel, delayed
 
+from socialnav_mj.cluster import active_cluster, calls_on
+
 Result = TypeVar("Result")
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -62,17 +64,19 @@ def stoppable() -> Iterator[None]:
 def in_processes(
     function: Callable[..., Result], arguments: Iterable[tuple[object, ...]], *, n_jobs: int
 ) -> Iterator[Result]:
-    """Call a function with many arguments, in several processes.
+    """Call a function with many arguments, in several processes, or on a cluster in the block of `on_cluster`.
 
     Args:
         function: To be called; it and its results travel between processes.
         arguments: Of each call.
-        n_jobs: Processes; 1 for none but this one, -1 for one a core.
+        n_jobs: Processes; 1 for none but this one, or one of the cluster's; -1 for one a core.
 
     Returns:
         Results in the order in which the calls end, which differs from one time to the next. An exception of a call is
         raised here. The processes end within a second of this one, however it ends.
     """
+    if (cluster := active_cluster()) is not None:
+        return calls_on(cluster, function, arguments, n_jobs=n_jobs)
     with _held_back(STOPPING):
         # Processes start here and inherit it: signals are this process's to handle, which then ends them.
         results: Iterator[Result] = Parallel(

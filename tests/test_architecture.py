@@ -17,7 +17,7 @@ PACKAGES = ("socialnav_mj", "tasks")
 # `episode` stands above the simulator although it is filled after it: it is a record of numpy arrays, and physics and
 # task share its Outcome and Partner.
 ROWS = (
-    {"resources", "elementary", "geometry", "config", "files", "processes", "slots", "robot_files"},
+    {"resources", "elementary", "geometry", "config", "files", "cluster", "processes", "slots", "robot_files"},
     {"recordings"},
     {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
     {
@@ -96,8 +96,9 @@ ONLY_IN = {
     "gymnasium": {"envs", "learning"},
     "pettingzoo": {"envs"},
     "numba": {"controllers"},
+    "ray": {"cluster"},
 }
-LAZY = ("torch", "rerun", "stable_baselines3", "gymnasium", "pettingzoo", "matplotlib", "pyarrow", "numba")
+LAZY = ("torch", "rerun", "stable_baselines3", "gymnasium", "pettingzoo", "matplotlib", "pyarrow", "numba", "ray")
 
 # sha256 of the UCY files that may not travel with the project: annotations, homographies, groups.
 UCY_SUMS = {

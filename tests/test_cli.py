@@ -429,6 +429,28 @@ def test_version_is_that_of_the_package(capsys):
     assert capsys.readouterr().out == f"socialnav-mj {version('socialnav-mj')}\n"
 
 
+# train
+
+
+def test_trainings_of_several_seeds_have_folders_of_their_own(capsys, monkeypatch):
+    from socialnav_mj.learning import training
+
+    seen = []
+
+    def train(config, folder, *, data_dir):
+        seen.append((config.seed, str(folder), data_dir))
+        return Path(folder) / "best.safetensors"
+
+    monkeypatch.setattr(training, "train", train)
+    main(["train", "replay-irl", "--seeds", "3", "4", "--jobs", "1", "--out", "t", "--data-dir", "d"])
+    main(["train", "replay-irl", "--seeds", "5", "--jobs", "1"])
+    assert seen == [(3, "t/seed3", "d"), (4, "t/seed4", "d"), (5, "runs/train/plaza_continuous_seed5", None)]
+    assert "replay_irl(policy='t/seed4/best.safetensors')" in capsys.readouterr().out
+    assert "seeds = (3, 3) is not allowed; allowed: each once" in fails(
+        capsys, "train", "replay-irl", "--seeds", "3", "3"
+    )
+
+
 # list, data, bench
 
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 from dm_control.rl.control import PhysicsError
 
+from socialnav_mj.cli.arguments import LOCAL
 from socialnav_mj.cli.board import Leaderboard, PeopleAsRobots, Plant, Reaction
 from socialnav_mj.cli.catalogue import Data, List
 from socialnav_mj.cli.console import console, errors, failures, say
@@ -80,7 +81,8 @@ def main(args: list[str] | None = None) -> None:
     try:
         with stoppable():
             try:
-                command.run()
+                with getattr(command, "where", LOCAL).used():
+                    command.run()
             finally:
                 console.finish()
     except KeyboardInterrupt as stop:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from socialnav_mj.cli.arguments import Folder, Scenarios
+from socialnav_mj.cli.arguments import LOCAL, Folder, Scenarios, Where
 from socialnav_mj.cli.console import say
 from socialnav_mj.cli.study import run_study
 
@@ -45,6 +45,7 @@ class Leaderboard:
     """Seed of the first draw; the others count up from it. Draws below 100 are for choosing, not for reporting."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Path = Path("leaderboard")
     """Folder of the results."""
     publish: Folder = None
@@ -119,6 +120,7 @@ class _Conditions:
     """Seed of the first draw; the others count up from it. Draws below 100 are for choosing, not for reporting."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     publish: Folder = None
     """Folder that gets a copy of tables, figures and page: all that holds no recording and no episode."""
 

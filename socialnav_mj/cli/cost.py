@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import tyro
 from rich.table import Table
 
-from socialnav_mj.cli.arguments import Folder, Scenarios
+from socialnav_mj.cli.arguments import LOCAL, Folder, Scenarios, Where
 from socialnav_mj.cli.console import console, errors, follow, say
 
 
@@ -38,6 +38,7 @@ class StepSize:
     """Physics steps, the one to compare with first [s]."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Path = Path("runs/step_size")
     """Folder of the results."""
 

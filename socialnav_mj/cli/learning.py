@@ -1,18 +1,19 @@
 """The sub-commands of learning: `train` and `ship`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 
-from socialnav_mj.cli.arguments import Folder
+from socialnav_mj.cli.arguments import LOCAL, Folder, Where
 from socialnav_mj.cli.console import counted_progress, say
 from socialnav_mj.cli.settings import AttentionSettings, TrainingSettings
 from socialnav_mj.files import check_output
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
+from socialnav_mj.processes import in_processes
 from socialnav_mj.resources import install_hint
 
 
@@ -26,8 +27,13 @@ class TrainReplayIRL:
     """Where recordings are looked for first."""
     settings: Annotated[object, tyro.conf.arg(constructor=TrainingSettings)] = field(default_factory=TrainingSettings)
     """Settings of the training."""
+    seeds: tuple[int, ...] = ()
+    """Several trainings, with these seeds in place of --seed, in processes or on a cluster."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Folder = None
-    """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default."""
+    """Folder of the training; runs/train/DATASET_FEATURES_seedSEED by default; with --seeds each has OUT/seedSEED."""
 
     def run(self) -> None:
         """Train behind a bar, print every validation, and say where the chosen policy is."""
@@ -36,7 +42,7 @@ class TrainReplayIRL:
         except ImportError as error:
             raise RuntimeError(_needed(error)) from error
         config = TrainingConfig(datasets=self.dataset, **vars(self.settings))
-        _run(train, config, self.out or _folder(config), self.data_dir, controller="replay_irl")
+        _run(self, train, config, controller="replay_irl")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +55,13 @@ class TrainAttention:
     """Where recordings are looked for first."""
     settings: Annotated[object, tyro.conf.arg(constructor=AttentionSettings)] = field(default_factory=AttentionSettings)
     """Settings of the training."""
+    seeds: tuple[int, ...] = ()
+    """Several trainings, with these seeds in place of --seed, in processes or on a cluster."""
+    jobs: int = -1
+    """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Folder = None
-    """Folder of the training; runs/train/DATASET_people_seedSEED by default."""
+    """Folder of the training; runs/train/DATASET_people_seedSEED by default; with --seeds each has OUT/seedSEED."""
 
     def run(self) -> None:
         """Train behind a bar, print every validation, and say where the chosen policy is."""
@@ -59,7 +70,7 @@ class TrainAttention:
         except ImportError as error:
             raise RuntimeError(_needed(error)) from error
         config = AttentionConfig(datasets=self.dataset, **vars(self.settings))
-        _run(train_attention, config, self.out or _folder(config), self.data_dir, controller="attention")
+        _run(self, train_attention, config, controller="attention")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +81,11 @@ class Train:
         Annotated[TrainReplayIRL, tyro.conf.subcommand("replay-irl")]
         | Annotated[TrainAttention, tyro.conf.subcommand("attention")]
     ]
+
+    @property
+    def where(self) -> Where:
+        """Where the trainings are run."""
+        return self.method.where
 
     def run(self) -> None:
         """Run one of the trainings."""
@@ -86,13 +102,41 @@ def _folder(config: TrainingConfig | AttentionConfig) -> Path:
 
 
 def _run(
+    asked: TrainReplayIRL | TrainAttention,
     train: Callable[..., Path],
     config: TrainingConfig | AttentionConfig,
-    out: Path,
-    data_dir: Path | None,
     controller: str,
 ) -> None:
-    check_output(out)
+    if len(set(asked.seeds)) < len(asked.seeds):
+        raise ValueError(f"seeds = {asked.seeds} is not allowed; allowed: each once")
+    data_dir = None if asked.data_dir is None else str(asked.data_dir)
+    if not asked.seeds and asked.where == LOCAL:
+        check_output(out := asked.out or _folder(config))
+        _tell(_run_here(train, config, out, data_dir), controller)
+        return
+    planned = []
+    for seed in asked.seeds or (config.seed,):
+        own = replace(config, seed=seed)
+        out = _folder(own) if asked.out is None else asked.out / f"seed{seed}" if asked.seeds else asked.out
+        check_output(out)
+        planned.append((train, own, out, data_dir))
+    with counted_progress() as progress:
+        bar = progress.add_task("trainings", total=len(planned))
+        for best in in_processes(_run_there, planned, n_jobs=asked.jobs):
+            progress.advance(bar)
+            _tell(best, controller)
+
+
+def _run_there(
+    train: Callable[..., Path], config: TrainingConfig | AttentionConfig, out: Path, data_dir: str | None
+) -> Path:
+    """Train in a process of its own, from the last checkpoint if there is one."""
+    return train(config, out, data_dir=data_dir)
+
+
+def _run_here(
+    train: Callable[..., Path], config: TrainingConfig | AttentionConfig, out: Path, data_dir: str | None
+) -> Path:
     with counted_progress() as progress:
         bar = progress.add_task("scene steps", total=config.scene_steps)
 
@@ -106,7 +150,10 @@ def _run(
                     progress.console,
                 )
 
-        best = train(config, out, data_dir=None if data_dir is None else str(data_dir), progress=report)
+        return train(config, out, data_dir=data_dir, progress=report)
+
+
+def _tell(best: Path, controller: str) -> None:
     say(f"policy: {best}\nuse it: --controllers \"{controller}(policy='{best}')\"")
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 from rich.table import Table
 
-from socialnav_mj.cli.arguments import Folder, Name, Scenarios
+from socialnav_mj.cli.arguments import LOCAL, Folder, Name, Scenarios, Where
 from socialnav_mj.cli.console import console, counted_progress, errors, follow, say
 from socialnav_mj.cli.recordings import describe
 from socialnav_mj.cli.settings import Settings, changes
@@ -52,6 +52,7 @@ class Evaluate:
     """Own metrics that the tables get too: package.module:function of an Episode that gives a number for each agent."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Folder = None
     """Folder of the results; runs/DATASET by default."""
     again: bool = False
@@ -115,6 +116,7 @@ class Report:
     """Own metrics that the tables get too: package.module:function."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
 
     def run(self) -> None:
         """Write everything that is computed from the episodes, and print the main columns."""
@@ -153,6 +155,7 @@ class Verify:
     """Recordings with a longer gap between two positions of one person are refused [s]."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
 
     def run(self) -> None:
         """Print a line for each file and how many agree; exit with 1 if one does not."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from socialnav_mj.cli.arguments import Folder, Scenarios
+from socialnav_mj.cli.arguments import LOCAL, Folder, Scenarios, Where
 from socialnav_mj.cli.console import say
 from socialnav_mj.cli.study import run_study
 
@@ -65,6 +65,7 @@ class Reproduce:
     """Trainings of the same; all by default."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Path = Path("reproduction")
     """Folder of the results."""
     publish: Folder = None
@@ -115,6 +116,7 @@ class LeaveOneOut:
     """Seed of the first draw; the others count up from it."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Path = Path("leave_one_out")
     """Folder of the results."""
     publish: Folder = None
@@ -160,6 +162,7 @@ class Gains:
     """Seed of the first draw; the others count up from it, those below 100 are for choosing."""
     jobs: int = -1
     """Processes; -1 for one a core."""
+    where: Where = LOCAL
     out: Path = Path("gains")
     """Folder of the results."""
     publish: Folder = None
