@@ -89,7 +89,7 @@ def test_command_of_the_issue_is_accepted(capsys, monkeypatch):
 def test_evaluate_prints_tables_and_writes_everything_and_report_does_it_again(capsys):
     main([*QUICK])
     output, errors = capsys.readouterr()
-    assert "episodes" in errors and "3/3" in errors and "real time" in errors and "left" in errors
+    assert "episodes 3/3\n" in errors
     assert "episodes" not in output
     assert max(map(len, output.splitlines())) <= 80
     for name in ("tiny (text), scenario_1", "potential_field", "go_straight", "human", "success", "path"):
@@ -197,7 +197,7 @@ def test_failing_controller_is_told_once_and_the_others_are_kept(capsys):
         ([*QUICK, "--robot-radius", "-1"], "Robot.radius = -1.0 is not allowed; allowed: numbers in [0.1, 0.4]"),
         ([*QUICK, "--robot-radius", "2"], "Robot.radius = 2.0 is not allowed; allowed: numbers in [0.1, 0.4]"),
         ([*QUICK, "--pedestrian-radius", ".01"], "pedestrian_radius = 0.01 is not allowed; allowed: numbers in [0.05"),
-        ([*QUICK, "--control-timestep", "100"], "control_timestep = 100.0 is not allowed; allowed: at most 1,"),
+        ([*QUICK, "--control-timestep", "100"], "control_timestep = 100.0 is not allowed; allowed: at most 1 s,"),
         ([*QUICK, "--control-timestep", "0.013"], "control_timestep = 0.013 is not allowed"),
         ([*QUICK, "--turn-limit", "none"], "invalid choice 'none' for argument '--turn-limit'"),
         ([*QUICK, "--out", TINY], f"output folder {TINY!r} is not allowed: {TINY} is a file; allowed: a folder"),

@@ -114,7 +114,7 @@ def test_bounds_themselves_are_allowed_and_move_with_what_they_depend_on() -> No
     Scenario(control_timestep=1.0)
     Scenario(control_timestep=0.5, robot=Robot(max_speed=2.0))
     Scenario(control_timestep=0.01, turn_limit="per_second")
-    with pytest.raises(ValueError, match=r"control_timestep = 0\.6 .* at most 0\.5, in which a robot at 2\.0 m/s"):
+    with pytest.raises(ValueError, match=r"control_timestep = 0\.6 .* at most 0\.5 s, or a robot at 2\.0 m/s"):
         Scenario(control_timestep=0.6, robot=Robot(max_speed=2.0))
 
 

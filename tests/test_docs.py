@@ -98,6 +98,12 @@ def run(words: list[str], parse: Callable[[list[str]], Any]) -> None:
             RUNS[type(command)](dataclasses.replace(command, **changes))
     elif program == "make":
         assert set(arguments) <= targets_of_make(), arguments
+    elif program == "pip":
+        extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+            "optional-dependencies"
+        ]
+        place = re.fullmatch(r"install -c constraints\.txt -e \.\[([a-z,]+)\]", " ".join(arguments))
+        assert place is not None and set(place[1].split(",")) <= set(extras), arguments
     elif program == "rerun":
         assert all(Path(file).is_file() for file in arguments), f"no {arguments}"
     else:

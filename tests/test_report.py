@@ -325,7 +325,7 @@ def test_terminal_tables_fit_and_name_every_row(run, width):
     for table in terminal_tables(writer.write_report(run).estimates):
         console.print(table)
     text = console.export_text()
-    for word in (*CONTROLLERS, "scenario_1", "scenario_4", "0.25", "0.14", "4 draw(s)", "[s]", "[m/s]"):
+    for word in (*CONTROLLERS, "scenario_1", "scenario_4", "0.25", "0.14", "4 draws", "[s]", "[m/s]"):
         assert word in text, word
     assert "…" not in text and max(map(len, text.splitlines())) <= width
     assert "speed" in text and text.count("±") == 2 + 6
