@@ -4,18 +4,22 @@ import csv
 import dataclasses
 import re
 import shlex
+import subprocess
 import sys
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+import yaml
 from house import PAGE, with_figure
 from test_architecture import ROOT
 
 from socialnav_mj import cli
+from socialnav_mj.cli.arguments import Where
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
@@ -31,6 +35,7 @@ SMALL = {
     "List": {},
 }
 MOST_DRAWS = 2
+LANGUAGES = ("python", "bash", "yaml", "text")
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 CODE = re.compile(r"`([^`]+)`")
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)|src=\"([^\"]+)\"")
@@ -62,6 +67,7 @@ def parse(monkeypatch):
     seen: list[object] = []
     for kind in RUNS:
         monkeypatch.setattr(kind, "run", lambda self: seen.append(self))
+    monkeypatch.setattr(Where, "used", lambda self: nullcontext())  # no cluster is looked for
 
     def parsed(words: list[str]) -> object:
         cli.main(words)
@@ -111,20 +117,60 @@ def run(words: list[str], parse: Callable[[list[str]], Any]) -> None:
         assert all((ROOT / word).exists() for word in arguments if "/" in word), arguments
 
 
+def scripts(language: str, text: str) -> Iterator[str]:
+    """Scripts of the shell that a block is, or that a YAML block has in it."""
+    if language == "bash":
+        yield text
+        return
+    waiting = list(yaml.safe_load_all(text))
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, str) and "\n" in part:
+            yield part
+        elif isinstance(part, dict | list):
+            waiting += part.values() if isinstance(part, dict) else part
+
+
+def commands(script: str) -> list[list[str]]:
+    """Words of our own commands in a script that the shell can read."""
+    checked = subprocess.run(["bash", "-n"], input=script, capture_output=True, text=True, check=False)
+    assert checked.returncode == 0 and not checked.stderr, checked.stderr
+    found = [line.strip() for line in script.replace("\\\n", " ").splitlines()]
+    return [shlex.split(line)[1:] for line in found if line.startswith("socialnav-mj ")]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_code_blocks_run_in_their_order(page, here, parse, monkeypatch):
-    """A Python block that begins with a file's name is written to that file; one marked `text` is not run."""
+    """A Python block that begins with a file's name is written to that file; one marked `text` is not run.
+
+    Of YAML and of a script, which begins with `#!`, our own commands are parsed, and the rest is read by the shell.
+    """
     names: dict[str, object] = {"__name__": "docs"}
     for place, language, text in blocks(page):
-        assert language in {"python", "bash", "text"}, f"{place} is marked {language!r}; allowed: python, bash, text"
+        assert language in LANGUAGES, f"{place} is marked {language!r}; allowed: {', '.join(LANGUAGES)}"
         if language == "python" and (file := re.match(r"# (\w+\.py)\n", text)):
             (here / file[1]).write_text(text, encoding="utf-8")
             monkeypatch.delitem(sys.modules, Path(file[1]).stem, raising=False)  # another test's module of that name
         elif language == "python":
             exec(compile(text, place, "exec", dont_inherit=True), names)
+        elif language == "yaml" or (language == "bash" and text.startswith("#!")):
+            for script in scripts(language, text):
+                for arguments in commands(script):
+                    parse(arguments)
         elif language == "bash":
             for words in lines(text):
                 run(words, parse)
+
+
+def test_recipes_for_clusters_call_one_and_the_same_command():
+    found = [
+        arguments
+        for _, language, text in blocks(ROOT / "docs" / "scaling.md")
+        if language == "yaml" or text.startswith("#!")
+        for script in scripts(language, text)
+        for arguments in commands(script)
+    ]
+    assert len(found) == 2 and found[0] == found[1] and found[0][-2:] == ["--backend", "ray"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
