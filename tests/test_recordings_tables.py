@@ -59,7 +59,9 @@ def test_columns_say_what_a_table_without_a_header_holds(tmp_path: Path) -> None
     assert Reading(max_gap=9.0).again(12.5, recording.reading) == dataclasses.replace(
         reading, frame_rate=12.5, max_gap=9.0
     )
-    with pytest.raises(ValueError, match="setting 'max_gap' of a recording is unknown; known: axis_order, columns, un"):
+    with pytest.raises(
+        ValueError, match="setting 'max_gap' of a recording is unknown; known: axis_order, columns, since, un"
+    ):
         reading.again(25.0, {"max_gap": 1e9})
     # The names of a header give way to those that are given.
     assert_read(load(tmp_path, "a,b,c,d,e\n" + content, reading))

@@ -180,7 +180,7 @@ def test_command_runs_goes_on_and_publishes_no_episode(policies, tmp_path, capsy
     page = (public / "README.md").read_text()
     assert ONE_RECORDING in page and " claims are undecided. *To decide*: " in page
     (heading,) = (
-        line for line in page.splitlines() if line.startswith("| scenario | controller | success | hit first")
+        line for line in page.splitlines() if line.startswith("| scenario | controller | success | first collision")
     )
     assert heading.endswith("| same agents |")
     found = re.findall(r"\| (\d+) of (\d+)(?: \(\d+ %\))? \|$", page, flags=re.MULTILINE)

@@ -10,6 +10,7 @@ import argparse
 import json
 import subprocess
 import sys
+import tempfile
 import tomllib
 import venv
 from pathlib import Path
@@ -30,7 +31,7 @@ def interpreter(name: str, requirements: list[str], folder: Path) -> Path:
         folder: Of all environments.
 
     Returns:
-        The executable.
+        Path of the executable.
     """
     if not requirements:
         return Path(sys.executable)
@@ -61,7 +62,8 @@ def run(python: Path, peer: dict[str, Any], *, agents: int, seconds: float) -> d
     """
     command = [python, HERE / peer["script"], *peer.get("arguments", [])]
     command += ["--agents", str(agents), "--seconds", str(seconds)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:  # some leave a log where they run
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{peer['title']} with {agents} agents failed:\n{done.stderr[-2000:]}")
     result: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
@@ -105,15 +107,20 @@ def draw(rows: list[dict[str, Any]], peers: dict[str, Any], counts: list[int], p
         path: Of the picture.
     """
     figure, axes = plt.subplots(figsize=(7.0, 4.2), layout="constrained")
-    for name, peer in peers.items():
-        values = [
+    medians = {
+        name: [
             median(r["agent_seconds_per_second"] for r in rows if r["peer"] == name and r["agents"] == count)
             for count in counts
         ]
-        ours = name.startswith("socialnav_mj")
+        for name in peers
+    }
+    lowest = 0.0
+    for name in sorted(peers, key=lambda name: medians[name][-1]):
+        values, ours = medians[name], name.startswith("socialnav_mj")
         (line,) = axes.plot(counts, values, marker="o", linewidth=2.4 if ours else 1.2, alpha=1.0 if ours else 0.8)
+        lowest = max(values[-1], 1.25 * lowest)  # names one above the other
         axes.annotate(
-            peer["title"], (counts[-1], values[-1]), (6, 0), textcoords="offset points", va="center", fontsize=8,
+            peers[name]["title"], (counts[-1], lowest), (6, 0), textcoords="offset points", va="center", fontsize=8,
             color=line.get_color(),
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="agents", ylabel="simulated agent-seconds per second of CPU")
