@@ -4,6 +4,7 @@ import functools
 import hashlib
 import importlib
 import json
+import logging
 import os
 import re
 import signal
@@ -139,6 +140,7 @@ def test_evaluate_warns_once_of_a_frame_rate_that_makes_people_run(capfd, caplog
     (warning,) = [record.getMessage() for record in caplog.records if "people walk at" in record.getMessage()]
     assert "probably the frame rate of 100 Hz (given) is wrong" in warning
     assert "people walk at" not in capfd.readouterr().err  # of the processes that run the episodes
+    assert logging.lastResort.format(logging.makeLogRecord({"levelname": "WARNING", "msg": "x"})) == "WARNING: x"
 
 
 def test_settings_of_the_command_reach_the_episodes():

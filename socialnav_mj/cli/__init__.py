@@ -68,6 +68,8 @@ def main(args: list[str] | None = None) -> None:
     console.begin(as_json="--json" in given)
     errors.quiet = "--quiet" in given
     logging.disable(logging.WARNING if errors.quiet else logging.NOTSET)
+    if logging.lastResort is not None:  # what prints warnings where nobody has set up logging
+        logging.lastResort.setFormatter(logging.Formatter("%(levelname)s: %(message)s"))
     command = tyro.cli(
         Command,
         prog="socialnav-mj",
