@@ -355,6 +355,23 @@ def test_make_controller_names_what_is_wrong_and_what_exists(spec, named):
     assert named in str(caught.value)
 
 
+class Bare:
+    """README's kind: no arguments, and a name that belongs to the class."""
+
+    name = "bare"
+
+    def reset(self, limits, *, seed=0):
+        self.limits = limits
+
+    def act(self, observation):
+        return np.zeros((len(observation["active"]), 2))
+
+
+def test_a_class_without_arguments_can_be_given_a_name():
+    assert make_controller(f"{__name__}:Bare").name == "bare"
+    assert make_controller(f"edited={__name__}:Bare").name == "edited"
+
+
 def test_controller_config_holds_the_class_and_the_fields_as_json_values():
     config = controller_config(PotentialField(attraction_limit=None))
     assert config.pop("class") == "socialnav_mj.controllers.potential_field:PotentialField"

@@ -135,7 +135,8 @@ def made(kind: Callable[..., Controller], settings: dict[str, Any]) -> Controlle
     """
     parts = {name: _part(settings[name]) for name in parts_of(kind) if name in settings}
     arguments = settings | parts
-    if "name" not in arguments or "name" in (parameters_of(kind) or ("name",)):
+    taken = parameters_of(kind)
+    if "name" not in arguments or taken is None or "name" in taken:
         return kind(**arguments)
     name = arguments.pop("name")
     controller = kind(**arguments)
