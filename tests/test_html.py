@@ -59,6 +59,12 @@ def test_report_draws_intervals_shades_ties_and_says_where_rows_come_from(run):
     table = shown.xpath("//table")[0]
     headings = [th.text_content() for th in table.xpath(".//th")]
     column = headings.index("time, censored [s]")
+    told = [th.get("title") for th in table.xpath(".//th")]
+    assert (
+        told[0] is None
+        and "lower bound" in told[column]
+        and told[headings.index("time of successes [s]")] != told[column]
+    )
     rows = {tr.xpath("./td")[0].text_content(): tr.xpath("./td") for tr in table.xpath("./tbody/tr")}
     assert list(rows) == ["fast", "slow", "fickle", "human"]
     looks = {name: cells[column].get("class").split() for name, cells in rows.items()}

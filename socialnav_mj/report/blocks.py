@@ -103,6 +103,8 @@ class Table:
 
     headings: tuple[str, ...]
     rows: tuple[Row, ...]
+    told: tuple[str, ...] = ()
+    """What is told of each heading when it is pointed at, empty for nothing; none of them if there are fewer."""
 
     @property
     def has_origins(self) -> bool:

@@ -1,9 +1,10 @@
 """report.html: what report.md says, with intervals drawn, ties shaded, and rows that say where they come from."""
 
+import re
 from collections.abc import Sequence
 
 from socialnav_mj.report.blocks import Cell, Origin, Row, Table
-from socialnav_mj.report.estimates import MEASURES, Estimate
+from socialnav_mj.report.estimates import MEASURES, Estimate, Measure
 from socialnav_mj.report.intervals import LEAST
 from socialnav_mj.report.markdown import bounds, number
 from socialnav_mj.report.origins import origins
@@ -43,6 +44,13 @@ def run_blocks(
     return report_blocks(summary, estimates, tables, sections, cells=_CELLS)
 
 
+def _told(measure: Measure) -> str:
+    """What a heading stands for, as docs/metrics.md defines it, without its Markdown."""
+    whom = "; over successes alone" if measure.mean.successes else ""
+    share = f"; share of agents with {measure.mean.share_of!r}" if measure.mean.share_of else ""
+    return re.sub(r"[*`$]", "", measure.metric.formula) + share + whom
+
+
 def _table(
     place: Place,
     rows: Sequence[tuple[str, dict[str, Estimate]]],
@@ -52,6 +60,7 @@ def _table(
     shown = [MEASURES[name] for name in SHOWN]
     return Table(
         headings=("controller", *(measure.heading for measure in shown), "draws", "agents"),
+        told=("", *(_told(measure) for measure in shown), "", "of all draws together"),
         rows=tuple(
             Row(
                 cells=(
