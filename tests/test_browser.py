@@ -79,6 +79,18 @@ def test_report_shows_its_figures_and_intervals(page):
     assert bars["width"] > 20 and bars["height"] > 3
 
 
+def test_first_table_fits_a_laptop_and_keeps_the_names_in_sight_where_it_does_not(page):
+    page.set_viewport_size({"width": 1400, "height": 900})
+    wide = page.locator(".wide").first
+    assert wide.evaluate("e => e.scrollWidth - e.clientWidth") == 0
+    page.set_viewport_size({"width": 700, "height": 900})
+    assert wide.evaluate("e => e.scrollWidth - e.clientWidth") > 100
+    name = wide.locator("tbody td").first
+    before = name.bounding_box()
+    wide.evaluate("e => { e.scrollLeft = 100 }")
+    assert name.bounding_box() == before
+
+
 def test_report_runs_no_script_of_a_name(page):
     assert page.evaluate("window.hacked") is None
     assert page.locator("table").first.get_by_text("<script>").count() >= 1
