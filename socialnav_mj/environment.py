@@ -101,8 +101,9 @@ def build_environment(
         random: Kept by the task, which draws nothing from it.
         environment_kwargs: Passed to `dm_control.rl.control.Environment`.
         robots: How many are built at first: one for each slot, as many as are likely to be in the scene at once, or a
-            number >= 1. When a slot beyond them is used, the scene is compiled anew with more. No bit of an episode
-            depends on it, but who holds on to the model, as dm_control's viewer does, must not see it change.
+            number >= 1. When a slot beyond them is used, the scene is compiled anew with more. Only "all" has the parts
+            that are for the eye alone. No bit of an episode depends on it, but who holds on to the model, as
+            dm_control's viewer does, must not see it change.
         replaced: Indices of the people who become agents, ascending; those of the scenario's draw by default.
 
     Returns:
@@ -117,6 +118,7 @@ def build_environment(
         n_pedestrian_slots=task.cast.n_pedestrian_slots,
         low=everywhere.min(axis=0),
         high=everywhere.max(axis=0),
+        is_drawn=robots == "all",
     )
     sizes = {"all": task.cast.n_agent_slots, "likely": task.cast.n_likely_agents}
     count = robots if isinstance(robots, int) else sizes[robots]

@@ -56,6 +56,7 @@ def build_model(
     low: Array,
     high: Array,
     n_robots: int | None = None,
+    is_drawn: bool = True,
 ) -> mujoco.MjModel:
     """Compile the arena with a pool of robots and a pool of pedestrians, apart from one another on the floor.
 
@@ -67,6 +68,8 @@ def build_model(
         low: Least coordinates of the recorded crowd, shape (2,) [m].
         high: Greatest coordinates, shape (2,) [m].
         n_robots: Robots in the pool, for the first of the slots; for all of them by default.
+        is_drawn: Whether robots and people have the parts that are for the eye alone. They touch nothing and weigh
+            nothing, but every step works out where they are.
 
     Returns:
         The model. Robots are compiled with gravity compensation, so that parked ones need no floor.
@@ -86,8 +89,9 @@ def build_model(
     arena.nuser_geom = 2
     _note_contacts(arena)
     count = n_agent_slots if n_robots is None else n_robots
-    _attach_pool(arena, _robot(scenario, assets), prefix=AGENT_PREFIX, count=count, row=0)
-    _attach_pool(arena, _person(scenario, assets), prefix=PEDESTRIAN_PREFIX, count=n_pedestrian_slots, row=1)
+    robot, person = _robot(scenario, assets, is_drawn=is_drawn), _person(scenario, assets, is_drawn=is_drawn)
+    _attach_pool(arena, robot, prefix=AGENT_PREFIX, count=count, row=0)
+    _attach_pool(arena, person, prefix=PEDESTRIAN_PREFIX, count=n_pedestrian_slots, row=1)
     arena.add_numeric(name=REARM_TIME, data=[scenario.contact_rearm_time], size=1)
     arena.add_numeric(name=AGENT_SLOTS, data=[n_agent_slots], size=1)
     if scenario.plant == "unicycle":
@@ -126,9 +130,11 @@ def _attach_pool(arena: mujoco.MjSpec, member: mujoco.MjSpec, *, prefix: str, co
             slot += size
 
 
-def _robot(scenario: Scenario, assets: Path) -> mujoco.MjSpec:
+def _robot(scenario: Scenario, assets: Path, *, is_drawn: bool) -> mujoco.MjSpec:
     """A robot for the pool."""
     robot = robot_spec(_robot_file(scenario.robot, assets), scenario.robot)
+    if not is_drawn:
+        _delete_visuals(robot)
     robot.geom("bumper").size[0] = scenario.robot.radius
     if scenario.floor_friction is not None:
         for wheel in ("left_wheel", "right_wheel"):
@@ -141,9 +147,11 @@ def _robot(scenario: Scenario, assets: Path) -> mujoco.MjSpec:
     return _member(robot)
 
 
-def _person(scenario: Scenario, assets: Path) -> mujoco.MjSpec:
+def _person(scenario: Scenario, assets: Path, *, is_drawn: bool) -> mujoco.MjSpec:
     """A person for the pool; one who yields is in a body that slides along x and y and bears a person's mass."""
     person = mujoco.MjSpec.from_file(str(assets / "pedestrian.xml"))
+    if not is_drawn:
+        _delete_visuals(person)
     person.geom("body").size[0] = scenario.pedestrian_radius
     if scenario.pedestrian_body == "rigid":
         return _member(person)
@@ -156,6 +164,19 @@ def _person(scenario: Scenario, assets: Path) -> mujoco.MjSpec:
         carrier.add_joint(name=f"/{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=way)
     carrier.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
     return _member(person, whole, carrier)
+
+
+def _delete_visuals(spec: mujoco.MjSpec) -> None:
+    """Delete what is for the eye alone, unless something in the model measures or pulls there."""
+    trial = spec.copy()
+    for attempt in (trial, spec):
+        seen = [geom for geom in attempt.geoms if geom.mass == 0.0 and not (geom.contype or geom.conaffinity)]
+        for part in (*seen, *attempt.sites, *attempt.cameras, *attempt.lights):
+            attempt.delete(part)
+        try:
+            trial.compile()
+        except ValueError:  # it refers to one of them
+            return
 
 
 def _member(spec: mujoco.MjSpec, whole: mujoco.MjSpec | None = None, body: Any = None) -> mujoco.MjSpec:

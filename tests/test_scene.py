@@ -15,9 +15,9 @@ from socialnav_mj.scene_index import index_scene
 LOW, HIGH = np.array([-2.0, 3.0]), np.array([6.0, 9.0])
 
 
-def model_of(scenario: Scenario | None = None, n_agents: int = 3, n_pedestrians: int = 2) -> Any:
+def model_of(scenario: Scenario | None = None, n_agents: int = 3, n_pedestrians: int = 2, **more: Any) -> Any:
     return build_model(
-        scenario or Scenario(), n_agent_slots=n_agents, n_pedestrian_slots=n_pedestrians, low=LOW, high=HIGH
+        scenario or Scenario(), n_agent_slots=n_agents, n_pedestrian_slots=n_pedestrians, low=LOW, high=HIGH, **more
     )
 
 
@@ -165,3 +165,22 @@ def test_a_robot_whose_classes_are_nested_keeps_what_they_say(tmp_path: Path) ->
         caster = model.geom(agent_name(slot) + "front_caster")
         np.testing.assert_allclose(caster.rgba, [0.1, 0.2, 0.3, 1.0], rtol=1e-6)
         assert (caster.size[0], caster.contype[0], caster.condim[0]) == (0.02, 1, 1)
+
+
+def test_a_scene_that_nobody_looks_at_has_colliders_alone_and_weighs_the_same() -> None:
+    seen, bare = model_of(), model_of(is_drawn=False)
+    assert bare.nsite == 0 and bare.ncam == 2 and bare.ngeom == 1 + 3 * 5 + 2
+    assert all(bare.geom(i).contype or bare.geom(i).conaffinity for i in range(bare.ngeom))
+    for name in ("body_mass", "body_inertia", "body_invweight0", "dof_invweight0", "qpos0", "actuator_gainprm"):
+        np.testing.assert_array_equal(getattr(bare, name), getattr(seen, name))
+    for i in range(bare.ngeom):
+        same = seen.geom(bare.geom(i).name)
+        assert (bare.geom(i).size == same.size).all() and (bare.geom(i).pos == same.pos).all()
+
+
+def test_a_robot_that_measures_at_a_site_keeps_it_where_nobody_looks(tmp_path: Path) -> None:
+    text = (assets_folder() / "robot.xml").read_text()
+    sensor = '<sensor><gyro name="gyro" site="lidar"/></sensor></mujoco>'
+    (tmp_path / "gyro.xml").write_text(text.replace("</mujoco>", sensor))
+    model = model_of(Scenario(robot=Robot(model=str(tmp_path / "gyro.xml"))), is_drawn=False)
+    assert model.nsensor == 3 and model.nsite == 3 * 9
