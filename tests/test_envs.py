@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import tomllib
 import warnings
 
 import numpy as np
@@ -14,19 +13,17 @@ import gymnasium
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from scenes import TINY, recording_of, stand, walk
-from test_architecture import ROOT
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Limits, make_controller
 from socialnav_mj.environment import build_environment
-from socialnav_mj.envs import ENVIRONMENT_ID, SCENARIOS, register
+from socialnav_mj.envs import ENVIRONMENT_ID, SCENARIOS
 from socialnav_mj.envs.single import CrowdEnv
 from socialnav_mj.features import feature_set, running_state, view_of
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.recordings.draw import replaced_people
 from socialnav_mj.recordings.window import excerpt
 
-register()
 FIRST = ENVIRONMENT_ID.format(number=1)
 CROSSING = recording_of(
     walk([(0.0, 0.0), (4.0, 0.0)], 1.0), walk([(2.0, -6.0), (2.0, 6.0)], 1.0), walk([(4.0, 1.0), (0.0, 1.0)], 1.0)
@@ -81,12 +78,17 @@ def test_pettingzoos_checkers_have_nothing_to_say(kind):
         checkers.parallel_seed_test(lambda: parallel_env(scenario=4, dataset=TINY, **kind))
 
 
-def test_gymnasium_finds_the_scenarios_of_an_installed_package_by_itself():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["entry-points"]["gymnasium.envs"] == {"SocialNavMJ": "socialnav_mj.envs:register"}
-    code = "import sys, socialnav_mj.envs as e; e.register(); e.register(); print('mujoco' in sys.modules)"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert found.stdout.split() == ["False"], "registering must not load the simulator"
+@pytest.mark.parametrize(
+    ("code", "loads_mujoco"),
+    [
+        ("import socialnav_mj.envs; gymnasium.spec('SocialNavMJ/Scenario1-v0')", False),
+        (f"gymnasium.make('socialnav_mj.envs:SocialNavMJ/Scenario1-v0', dataset={str(TINY)!r})", True),
+    ],
+)
+def test_gymnasium_finds_the_scenarios_after_an_import_or_with_the_modules_name(code, loads_mujoco, tmp_path):
+    code = f"import sys, gymnasium; {code}; print('mujoco' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert found.stdout.split() == [str(loads_mujoco)]
 
 
 # One agent
