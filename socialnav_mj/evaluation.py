@@ -6,6 +6,7 @@ import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -15,7 +16,8 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import make_controller, split_label
 from socialnav_mj.environment import build_environment
 from socialnav_mj.files import check_output, clear_leftovers, finished_files, write_whole
-from socialnav_mj.human import HUMAN, human_episode
+from socialnav_mj.human import HUMAN, human_episode_in_parts
+from socialnav_mj.parts import file_of_part, is_before_last
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import recording_metadata
 from socialnav_mj.recordings import DEFAULT_READING, Reading, Recording, load_recording
@@ -32,7 +34,7 @@ from socialnav_mj.resumption import (
     named_controllers,
     set_aside,
 )
-from socialnav_mj.rollout import rollout
+from socialnav_mj.rollout import rollout_in_parts
 
 logger = logging.getLogger(__name__)
 
@@ -61,10 +63,14 @@ class Evaluation:
     """Number of draws."""
     seed: int = 0
     """Seed of the first draw; the others count up from it."""
+    part: float | None = None
+    """Length at least of the parts in which episodes are written, see `parts`; whole by default [s]."""
     task_kwargs: dict[str, Any] = field(default_factory=dict)
     """Settings that differ from the scenarios', see `Scenario.changed`."""
 
     def __post_init__(self) -> None:
+        if self.part is not None and not 1.0 <= self.part < inf:
+            raise ValueError(f"part = {self.part:g} is not allowed; allowed: numbers >= 1 [s]")
         if unknown := [name for name in self.scenarios if name not in suite.ALL_TASKS]:
             raise ValueError(f"unknown task {unknown[0]!r}; available: {', '.join(suite.ALL_TASKS)}")
         if self.draws < 1:
@@ -89,7 +95,7 @@ class Job:
 
     @property
     def file_name(self) -> str:
-        """Name of the episode's file."""
+        """Name of the episode's file; of its last part, if it is written in parts."""
         label = "".join(c if c.isalnum() or c in "_-=." else "-" for c in self.controller)
         return f"{self.scenario}.{label}.draw_{self.draw:03d}.npz"
 
@@ -185,9 +191,8 @@ def evaluate(
     jobs = jobs_of(evaluation)
     clear_leftovers(folder / "episodes")
     # Episodes of earlier commands belong to the run as well: they are in its tables.
-    episodes = sorted(
-        {job.file_name for job in jobs} | {path.name for path in finished_files(folder / "episodes", ".npz")}
-    )
+    there = {path.name for path in finished_files(folder / "episodes", ".npz") if not is_before_last(path.name)}
+    episodes = sorted({job.file_name for job in jobs} | there)
     run = {"command": command, "controllers": [own.name for own in named.values()], "episodes": episodes}
     write_whole(folder / "run.json", (json.dumps(run, indent=1) + "\n").encode())
     return _run_all(jobs, folder / "episodes", n_jobs)
@@ -215,12 +220,15 @@ def _run(job: Job, folder: Path) -> Done:
     try:
         recording = recording_of(evaluation)
         scenario = _scenario(evaluation, job.scenario, job.draw)
+        told: dict[str, Any] = {"seconds": inf if evaluation.part is None else evaluation.part}
+        told["scenario_name"] = job.scenario
         if job.controller == HUMAN:
-            episode = human_episode(recording, scenario, scenario_name=job.scenario)
+            episodes = human_episode_in_parts(recording, scenario, **told)
         else:
             environment = build_environment(recording, scenario, robots="likely")
-            episode = rollout(environment, make_controller(job.controller), scenario_name=job.scenario)
-        episode.save(folder / job.file_name)
+            episodes = rollout_in_parts(environment, make_controller(job.controller), **told)
+        for episode in episodes:
+            episode.save(folder / file_of_part(job.file_name, episode.metadata))
     except Exception as error:  # noqa: BLE001  whatever it is, it is told and the other episodes go on
         frame = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({frame.filename}:{frame.lineno})"
@@ -260,6 +268,7 @@ def _changes(evaluation: Evaluation, folder: Path, recording: Recording, named: 
         scenario=lambda task, draw: _scenario(evaluation, task, draw).as_dict(),
         controllers={own.name: own.configuration for own in named.values()},
         jobs={job.file_name: (job.scenario, job.draw, named[job.controller].name) for job in jobs_of(evaluation)},
+        part=evaluation.part,
     )
     return changes(folder / "episodes", wanted)
 

@@ -1,15 +1,19 @@
 """Episodes in which the replaced people take the place of the agents, on their own recorded tracks: the human row."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.cast import cast_recording
+from socialnav_mj.cast import Cast, cast_recording
 from socialnav_mj.config import Scenario
 from socialnav_mj.contact import FORCE_COLUMNS, Contact, contact_columns
-from socialnav_mj.episode import Episode, Outcome, Partner
+from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
 from socialnav_mj.geometry import Array, wrap_angle
+from socialnav_mj.parts import PART, Part, Parting
 from socialnav_mj.provenance import episode_metadata, state_hash
 from socialnav_mj.recorder import recorded_series
 from socialnav_mj.recordings import Recording
@@ -35,56 +39,112 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
     Returns:
         An episode without wheel speeds (NaN) and contact forces (NaN); policy 0 stands for the person itself.
     """
-    cast = cast_recording(recording, scenario)
-    dt = scenario.control_timestep
+    (episode,) = human_episode_in_parts(recording, scenario, scenario_name=scenario_name)
+    return episode
+
+
+def human_episode_in_parts(
+    recording: Recording, scenario: Scenario, *, seconds: float = inf, scenario_name: str = ""
+) -> Iterator[Episode]:
+    """The same in parts, see `socialnav_mj.parts`.
+
+    Args:
+        recording: As for `human_episode`.
+        scenario: As for `human_episode`.
+        seconds: Length of a part at least; by default there is one, without an end [s].
+        scenario_name: As for `human_episode`.
+
+    Yields:
+        Records.
+    """
+    cast, dt = cast_recording(recording, scenario), scenario.control_timestep
     last = np.floor(recording.end_time[cast.agent_index] / dt + 1e-6).astype(np.int64)
     last = np.maximum(last, cast.agent_appear_step)
-    steps = int(max(last.max(), cast.pedestrian_last_step.max(initial=0))) + 1
-    time = np.arange(steps, dtype=float) * dt
-    position, velocity, heading = recorded_series(recording, cast.agent_index, cast.agent_appear_step, last, steps, dt)
-    near = np.linalg.norm(position - cast.agent_goal, axis=-1) <= scenario.goal_radius
-    near[last, np.arange(len(last))] = True
-    end = near.argmax(axis=0)
-    gone = np.arange(steps)[:, None] > end
-    position[gone], velocity[gone], heading[gone] = np.nan, np.nan, np.nan
-    under_way = (np.arange(steps)[:, None] >= cast.agent_appear_step) & (np.arange(steps)[:, None] < end)
+    final = int(max(last.max(), cast.pedestrian_last_step.max(initial=0)))
+    end = np.array([_arrival(recording, scenario, cast, agent, int(last[agent])) for agent in range(cast.n_agents)])
+    length = max(seconds / dt, 1.0)
+    parting, step = Parting(cast, length=length), 0
+    while True:
+        step = int(min(step + np.ceil(length), final))
+        if step == final or parting.is_due(step, end):
+            part = parting.cut(step, spawn=cast.agent_appear_step, end=end, is_last=step == final)
+            said = {} if seconds == inf else {PART: part.metadata(seconds, cast)}
+            yield _episode(recording, scenario, cast, part, end, scenario_name, said)
+        if step == final:
+            return
+
+
+def _arrival(recording: Recording, scenario: Scenario, cast: Cast, agent: int, last: int) -> int:
+    """Control step at which a person is within the goal radius of its end."""
+    steps = np.arange(cast.agent_appear_step[agent], last + 1)
+    place, _, _ = recording.person(int(cast.agent_index[agent])).at(steps * scenario.control_timestep)
+    near = np.linalg.norm(place - cast.agent_goal[agent], axis=-1) <= scenario.goal_radius
+    near[-1] = True
+    return int(steps[near.argmax()])
+
+
+def _episode(
+    recording: Recording,
+    scenario: Scenario,
+    cast: Cast,
+    part: Part,
+    end: IntArray,
+    scenario_name: str,
+    said: dict[str, Any],
+) -> Episode:
+    dt, agents, pedestrians = scenario.control_timestep, part.agents, part.pedestrians
+    # Who is under way when the part ends is cut there.
+    until, spans = np.minimum(end[agents], part.end), (part.begin, part.end + 1)
+    appear = cast.agent_appear_step[agents]
+    position, velocity, heading = recorded_series(recording, cast.agent_index[agents], appear, until, spans, dt)
+    steps = np.arange(*spans)[:, None]
     there, speed, facing = recorded_series(
-        recording, cast.pedestrian_index, cast.pedestrian_first_step, cast.pedestrian_last_step, steps, dt
+        recording,
+        cast.pedestrian_index[pedestrians],
+        cast.pedestrian_first_step[pedestrians],
+        cast.pedestrian_last_step[pedestrians],
+        spans,
+        dt,
     )
     people = [
         *(
-            _Person(int(i), Partner.AGENT, k, int(cast.agent_appear_step[k]), int(end[k]))
-            for k, i in enumerate(cast.agent_index)
+            _Person(int(cast.agent_index[i]), Partner.AGENT, k, int(cast.agent_appear_step[i]), int(end[i]))
+            for k, i in enumerate(agents)
         ),
         *(
             _Person(
-                int(i), Partner.PEDESTRIAN, k, int(cast.pedestrian_first_step[k]), int(cast.pedestrian_last_step[k]) + 1
+                int(cast.pedestrian_index[i]),
+                Partner.PEDESTRIAN,
+                k,
+                int(cast.pedestrian_first_step[i]),
+                int(cast.pedestrian_last_step[i]) + 1,
             )
-            for k, i in enumerate(cast.pedestrian_index)
+            for k, i in enumerate(pedestrians)
         ),
     ]
-    n = cast.n_agents
+    n = len(agents)
     contacts, ghosts = _contacts(recording, scenario, people, np.concatenate([position, there], axis=1))
-    digest = state_hash(position, velocity)
+    contacts = [one for one in contacts if (part.begin - 0.5) * dt <= one.time <= (part.end + 1) * dt]
+    finished = end[agents] <= part.end
     return Episode(
-        time=time,
-        agent_person=cast.agent_person.copy(),
-        agent_start=cast.agent_start.copy(),
-        agent_goal=cast.agent_goal.copy(),
-        agent_appear_time=cast.agent_appear_step.astype(float) * dt,
-        agent_spawn_time=cast.agent_appear_step.astype(float) * dt,
+        time=np.arange(*spans, dtype=float) * dt,
+        agent_person=cast.agent_person[agents],
+        agent_start=cast.agent_start[agents],
+        agent_goal=cast.agent_goal[agents],
+        agent_appear_time=appear.astype(float) * dt,
+        agent_spawn_time=appear.astype(float) * dt,
         agent_deadline=np.full(n, np.nan),
-        agent_end_time=end * dt,
-        agent_outcome=np.full(n, Outcome.ARRIVED, dtype=np.int64),
+        agent_end_time=until * dt,
+        agent_outcome=np.where(finished, Outcome.ARRIVED, Outcome.UNFINISHED).astype(np.int64),
         agent_ghost_overlaps=np.bincount(ghosts, minlength=n).astype(np.int64),
         agent_position=position,
         agent_heading=heading,
         agent_velocity=velocity,
         agent_yaw_rate=np.where(np.isnan(heading), np.nan, _yaw_rate(heading, dt)),
         agent_tilt=np.where(np.isnan(heading), np.nan, 0.0),
-        agent_wheel_speed=np.full((steps, n, 2), np.nan),
-        agent_policy=np.where(under_way, 0, -1),
-        pedestrian_person=cast.pedestrian_person.copy(),
+        agent_wheel_speed=np.full((part.n_samples, n, 2), np.nan),
+        agent_policy=np.where((steps >= appear) & (steps < until), 0, -1),
+        pedestrian_person=cast.pedestrian_person[pedestrians],
         pedestrian_position=there,
         pedestrian_heading=facing,
         pedestrian_velocity=speed,
@@ -96,8 +156,9 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
             controller=HUMAN,
             controller_config={},
             scenario_name=scenario_name,
-            steps=steps - 1,
-            state_hash=digest,
+            steps=part.end,
+            state_hash=state_hash(position, velocity),
+            **said,
         ),
     )
 

@@ -1,7 +1,9 @@
 """An episode run again from what its file says of itself, as far as the file may say it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +12,13 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import controller_of
 from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import Episode
-from socialnav_mj.human import HUMAN, human_episode
+from socialnav_mj.human import HUMAN, human_episode_in_parts
+from socialnav_mj.parts import PART, number_of_part
 from socialnav_mj.recordings import DEFAULT_READING, Reading, Recording, load_recording
 from socialnav_mj.recordings.catalogue import catalogue
 from socialnav_mj.report.agents import check_names
 from socialnav_mj.resources import assets_folder
-from socialnav_mj.rollout import rollout
+from socialnav_mj.rollout import rollout_in_parts
 
 MAX_PHYSICS_STEPS = 10_000_000
 """More are not simulated for one file, whatever it says: 28 hours at the default step."""
@@ -76,13 +79,24 @@ def resimulate(
             f"{source['checksum']}"
         )
     name = _scenario_name(metadata["scenario_name"], scenario)
+    part = metadata.get(PART)
+    told: dict[str, Any] = {"scenario_name": name, "seconds": inf if part is None else part["seconds"]}
     if metadata["controller"] == HUMAN:
-        return human_episode(recording, scenario, scenario_name=name)
+        return _part(human_episode_in_parts(recording, scenario, **told), metadata)
     controller = controller_of(metadata["controller_config"], trusted=trust.controllers)
-    # Half a step before the end, so that rounding cannot add a step.
-    limit = (metadata["steps"] - 0.5) * scenario.control_timestep
+    # Half a step before the end, so that rounding cannot add a step; what comes after a part decides nothing in it.
+    limit = (metadata["steps"] - 0.5) * scenario.control_timestep if part is None or part["is_last"] else inf
     environment = build_environment(recording, scenario, time_limit=limit, robots="likely")
-    return rollout(environment, controller, scenario_name=name)
+    return _part(rollout_in_parts(environment, controller, **told), metadata)
+
+
+def _part(episodes: Iterator[Episode], metadata: dict[str, Any]) -> Episode:
+    """The part that the metadata name, or the whole."""
+    number = number_of_part(metadata)
+    for episode in episodes:
+        if number_of_part(episode.metadata) == number:
+            return episode
+    raise ValueError(f"part.number = {number}, but the episode has fewer parts of {metadata[PART]['seconds']} s")
 
 
 def _scenario_name(stated: str, scenario: Scenario) -> str:

@@ -15,6 +15,7 @@ from socialnav_mj.controllers.check import try_controller
 from socialnav_mj.episode import EpisodeError, check_name, read_header
 from socialnav_mj.files import finished_files
 from socialnav_mj.human import HUMAN
+from socialnav_mj.parts import PART
 from socialnav_mj.provenance import differences
 
 OnChange = Literal["refuse", "again", "keep"]
@@ -35,6 +36,8 @@ class Wanted:
     """Name in tables: configuration."""
     jobs: Mapping[str, tuple[str, int, str]]
     """File: task, draw and controller's name."""
+    part: float | None = None
+    """Length of the parts that episodes are written in; None for whole ones [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +94,7 @@ def changes(folder: Path, wanted: Wanted) -> tuple[Change, ...]:
             pairs = {
                 "recording": (metadata["recording"], wanted.recording),
                 "scenario": (metadata["scenario"], wanted.scenario(task, draw)),
+                PART: (metadata[PART]["seconds"] if PART in metadata else None, wanted.part),
             }
             then = {"name": metadata["controller"], **metadata["controller_config"]}
         except (KeyError, TypeError) as error:

@@ -1,7 +1,8 @@
 """The loop of one episode."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from math import inf
 
 import numpy as np
 from dm_control.rl import control
@@ -12,6 +13,7 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller, Limits, controller_config
 from socialnav_mj.controllers.base import neighbours_of
 from socialnav_mj.episode import Array, Episode
+from socialnav_mj.parts import PART, Parting
 from socialnav_mj.provenance import episode_metadata
 from socialnav_mj.recorder import Recorder
 
@@ -41,15 +43,64 @@ def rollout(
         PhysicsError: If the simulation became invalid.
         ValueError: If the controller's action, active policy or scores are not allowed.
     """
+    (episode,) = rollout_in_parts(environment, controller, scenario_name=scenario_name, progress=progress)
+    return episode
+
+
+def rollout_in_parts(
+    environment: control.Environment,
+    controller: Controller,
+    *,
+    seconds: float = inf,
+    scenario_name: str = "",
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[Episode]:
+    """Run one episode from its start to its end, and give its record in parts, each when it is complete.
+
+    No bit of what is simulated depends on the parts, and no more than a part is ever kept.
+
+    Args:
+        environment: As for `rollout`.
+        controller: As for `rollout`.
+        seconds: Length of a part at least, see `socialnav_mj.parts`; by default there is one, without an end [s].
+        scenario_name: As for `rollout`.
+        progress: As for `rollout`.
+
+    Yields:
+        Records; the state hash of each is of all control steps from the episode's first to the record's last.
+
+    Raises:
+        PhysicsError: If the simulation became invalid.
+        ValueError: If the controller's action, active policy or scores are not allowed.
+    """
     task, physics = environment.task, environment.physics
     scenario: Scenario = task.scenario
     configuration = controller_config(controller)  # before anything adds to its attributes
     controller.reset(Limits.of(scenario), seed=scenario.seed)
     task.neighbours = neighbours_of(controller)
-    recorder = Recorder(task)
+    recorder, parting = Recorder(task), Parting(task.cast, length=seconds / scenario.control_timestep)
     digest = hashlib.sha256()
     time_step = environment.reset()
     recorder.note_sample()
+
+    def episode(*, is_last: bool) -> Episode:
+        part = parting.cut(task.step, spawn=task.spawn_step, end=task.end_step, is_last=is_last)
+        said = {} if seconds == inf else {PART: part.metadata(seconds, task.cast)}
+        return recorder.episode(
+            part,
+            policies=_policies(controller),
+            metadata=episode_metadata(
+                task.recording,
+                scenario,
+                controller=controller.name,
+                controller_config=configuration,
+                scenario_name=scenario_name,
+                steps=task.step,
+                state_hash=digest.copy().hexdigest(),
+                **said,
+            ),
+        )
+
     while not time_step.last():
         action = np.asarray(controller.act(time_step.observation), dtype=float)
         agent = task.slot_agent
@@ -60,18 +111,9 @@ def rollout(
         digest.update(physics.state(np.flatnonzero(task.slot_agent != NOBODY)).tobytes())
         if progress is not None and task.step % _PROGRESS_PERIOD == 0:
             progress(task.time)
-    return recorder.episode(
-        policies=_policies(controller),
-        metadata=episode_metadata(
-            task.recording,
-            scenario,
-            controller=controller.name,
-            controller_config=configuration,
-            scenario_name=scenario_name,
-            steps=task.step,
-            state_hash=digest.hexdigest(),
-        ),
-    )
+        if parting.is_due(task.step, task.end_step) and not time_step.last():
+            yield episode(is_last=False)
+    yield episode(is_last=True)
 
 
 def _policies(controller: Controller) -> tuple[str, ...]:

@@ -95,6 +95,15 @@ class CrowdTask(base.Task):
         """Index of the agent under way in each slot, -1 for nobody, shape (n_slots,)."""
         return self._slot_agent.copy()
 
+    def forget_collisions(self, step: int) -> None:
+        """Drop the collisions that are older than a control step, for whoever has written them down.
+
+        Args:
+            step: Control step.
+        """
+        since = (step - 0.5) * self.scenario.control_timestep
+        self.collisions = [one for one in self.collisions if one.touch.time >= since]
+
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """Wheel speeds (left, right) of every slot, shape (n_slots, 2) [rad/s].
 

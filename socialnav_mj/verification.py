@@ -12,6 +12,7 @@ import pyarrow.parquet
 
 from socialnav_mj.episode import Episode
 from socialnav_mj.files import finished_files
+from socialnav_mj.parts import is_before_last
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import differences, package_versions, platform_facts
 from socialnav_mj.recordings import DEFAULT_READING, Reading
@@ -175,7 +176,8 @@ def _differing_values(stored: Episode, again: Episode) -> tuple[str, ...]:
 def _count(folder: Path) -> Verdict:
     """Whether the episodes of a folder are those that its evaluation has made."""
     path = folder / RUN_FILE
-    there = {file.name for file in finished_files(folder / "episodes", ".npz")}
+    # What is listed is whole, or the last part; which of the others are there, the tables tell.
+    there = {file.name for file in finished_files(folder / "episodes", ".npz") if not is_before_last(file.name)}
     try:
         run = read_run_file(path)
     except ValueError as error:

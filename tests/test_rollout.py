@@ -295,7 +295,9 @@ def test_a_record_that_no_file_may_hold_is_refused_when_it_has_grown_too_large(m
     environment = busy()
     n, m = environment.task.cast.n_agents, environment.task.cast.n_pedestrians
     monkeypatch.setattr("socialnav_mj.recorder.MAX_BYTES", 10 * (80 * n + 40 * m))
-    with pytest.raises(EpisodeError, match=rf"at 2 s the record of {n} agents and {m} people.*--since and --until"):
+    with pytest.raises(
+        EpisodeError, match=rf"at 2 s the record of {n} agents and {m} people.*in shorter parts, with --part"
+    ):
         rollout(environment, GoStraight())
     assert environment.task.step == 10
 

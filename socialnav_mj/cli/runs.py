@@ -46,6 +46,9 @@ class Evaluate:
     """Random choices of the replaced people; 10 or more for figures to publish."""
     seed: int = 0
     """Number of the first draw; the others count up from it. Draws below 100 are for choosing, others for reporting."""
+    part: float | None = None
+    """Write each episode in parts of so many seconds or a little more, for recordings of hours: no more than a part is
+    ever in memory. Nothing that is simulated depends on it."""
     robot: Name = None
     """Robot: turtlebot4, jackal, or the path of an MJCF file with its limits in a TOML beside it."""
     metrics: tuple[str, ...] = ()
@@ -85,6 +88,7 @@ class Evaluate:
             controllers=tuple(with_trust(with_policy_of(spec, self.dataset), self.trust) for spec in self.controllers),
             draws=self.draws,
             seed=self.seed,
+            part=self.part,
             task_kwargs=({} if self.robot is None else robot_settings(self.robot)) | changes(self.settings),
         )
         out = self.out or Path("runs") / Path(self.dataset).resolve().stem

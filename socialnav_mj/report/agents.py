@@ -12,6 +12,7 @@ from socialnav_mj import suite
 from socialnav_mj.episode import Episode, EpisodeError, check_name
 from socialnav_mj.metrics.metric import Kind, Metric
 from socialnav_mj.metrics.registry import METRICS, per_agent
+from socialnav_mj.parts import PART, check_part, number_of_part
 from socialnav_mj.report import columns as col
 
 _TYPES = {Kind.FLAG: pa.bool_(), Kind.COUNT: pa.int64(), Kind.NUMBER: pa.float64(), Kind.NAME: pa.string()}
@@ -72,6 +73,16 @@ class Source:
     def draw(self) -> int:
         """Seed of the permutation of people."""
         return int(self.metadata["draw"])
+
+    @property
+    def part(self) -> int:
+        """Place among the parts of its draw; 0 for a whole episode."""
+        return number_of_part(self.metadata)
+
+    @property
+    def is_last(self) -> bool:
+        """Whether it ends its draw, as whole episodes do."""
+        return bool(self.metadata[PART]["is_last"]) if PART in self.metadata else True
 
 
 def agents_table(episode: Episode, *, file: str = "", metrics: Sequence[Metric] = METRICS) -> pa.Table:
@@ -134,6 +145,7 @@ def check_names(metadata: dict[str, Any]) -> None:
         missing += [f"{key}.{part}" for part in parts if not isinstance(given, dict) or part not in given]
     if missing:
         raise EpisodeError(f"its metadata lack {', '.join(missing)}; there are {', '.join(sorted(metadata))}")
+    check_part(metadata)
     recording, scenario = metadata["recording"], metadata["scenario"]
     for key in ("controller", "scenario_name"):
         check_name(key, metadata[key])

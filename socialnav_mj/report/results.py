@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from socialnav_mj.metrics.metric import Metric
 from socialnav_mj.metrics.registry import METRICS
 from socialnav_mj.processes import in_processes
 from socialnav_mj.provenance import differences
+from socialnav_mj.report import columns as col
 from socialnav_mj.report.agents import Source, scenario_configuration
 from socialnav_mj.report.paired import HUMAN, pair_with_humans
 from socialnav_mj.report.scores import Scores, clear_old_scores, score, score_once
@@ -49,7 +51,7 @@ def read_results(
     Args:
         folder: The run; its episodes are `episodes/*.npz`.
         controllers: Order of the controllers; others follow alphabetically, the human row is always last.
-        files: Names of the episodes to read; all by default.
+        files: Names of the episodes to read, which are whole; all by default.
         metrics: That have columns.
         n_jobs: Processes that read.
         anew: Score everything, whatever was scored before.
@@ -59,8 +61,9 @@ def read_results(
 
     Raises:
         FileNotFoundError: If there is no episode, or a named one is not there.
-        EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, or if episodes that
-            would be averaged or compared differ in their configuration; the files are named.
+        EpisodeError: If a file is damaged, if two episodes are the same draw of the same thing, if parts of one are
+            missing, or if episodes that would be averaged or compared differ in their configuration; the files are
+            named.
     """
     episodes = Path(folder) / "episodes"
     there = finished_files(episodes, ".npz")
@@ -81,21 +84,46 @@ def read_results(
         dataset, variant, scenario, controller = source.group
         place = places.get(controller, len(places))
         share = float(source.metadata["scenario"]["share"])
-        return dataset, variant, share, scenario, controller == HUMAN, place, controller, source.draw, source.file
+        last = controller == HUMAN
+        return dataset, variant, share, scenario, last, place, controller, source.draw, source.part, source.file
 
     read.sort(key=key)
     sources = tuple(scores.source for scores in read)
     _check_comparable(sources)
+    _check_complete(sources)
     overlaps: dict[tuple[str, str, str], list[float]] = {}
     for scores in read:
         if np.isfinite(scores.overlap):
             overlaps.setdefault(scores.source.group[:3], []).append(scores.overlap)
     return Results(
-        agents=pair_with_humans(pa.concat_tables([scores.agents for scores in read]), metrics),
+        agents=pair_with_humans(_agents(read), metrics),
         contacts=pa.concat_tables([scores.contacts for scores in read]),
         overlaps=overlaps,
         sources=sources,
     )
+
+
+def _agents(read: Sequence[Scores]) -> pa.Table:
+    """All agents; those of the parts of a draw in the order of a whole episode, so that no mean differs in a bit."""
+    tables = []
+    for _, draw in groupby(read, key=lambda scores: (scores.source.group, scores.source.draw)):
+        own = [scores.agents for scores in draw]
+        tables.append(own[0] if len(own) == 1 else pa.concat_tables(own).sort_by(col.PERSON))
+    return pa.concat_tables(tables)
+
+
+def _check_complete(sources: Sequence[Source]) -> None:
+    """Of an episode in parts all parts are there: the last one is written last and knows its number."""
+    parts: dict[tuple[Any, ...], list[Source]] = {}
+    for source in sources:
+        parts.setdefault((*source.group, source.draw), []).append(source)
+    for own in parts.values():
+        last, count = own[-1], own[-1].part + 1
+        if len(own) < count or not last.is_last:
+            missing = f"{len(own)} of {count} parts of its draw are there" if last.is_last else "it is the latest part"
+            raise EpisodeError(
+                f"{last.file} is a part of an episode that is not complete: {missing}; repeat the command that ran it"
+            )
 
 
 def _check_comparable(sources: Sequence[Source]) -> None:
@@ -104,7 +132,7 @@ def _check_comparable(sources: Sequence[Source]) -> None:
     seen: dict[tuple[Any, ...], Source] = {}
     for source in sources:
         dataset, variant, scenario, controller = source.group
-        twin = seen.setdefault((*source.group, source.draw), source)
+        twin = seen.setdefault((*source.group, source.draw, source.part), source)
         if twin is not source:
             name = " / ".join(source.group)
             raise EpisodeError(f"{twin.file} and {source.file} are both draw {source.draw} of {name}; remove one")

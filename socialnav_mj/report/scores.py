@@ -23,6 +23,7 @@ from socialnav_mj.files import write_whole
 from socialnav_mj.metrics.contacts import pedestrian_overlaps
 from socialnav_mj.metrics.metric import Metric
 from socialnav_mj.metrics.registry import METRICS
+from socialnav_mj.parts import scored_agents
 from socialnav_mj.report.agents import Source, agents_table
 from socialnav_mj.report.collisions import contacts_table
 from socialnav_mj.report.paired import HUMAN
@@ -39,7 +40,7 @@ class Scores:
 
     source: Source
     agents: pa.Table
-    """Columns of `agents.agents_schema`, not yet paired."""
+    """Columns of `agents.agents_schema`, not yet paired; of a part, the agents that are scored in it."""
     contacts: pa.Table
     """Columns of `collisions.CONTACT_SCHEMA`."""
     overlap: float
@@ -73,8 +74,11 @@ def score(path: Path, metrics: Sequence[Metric] = METRICS) -> Scores:
     try:
         agents = agents_table(episode, file=path.name, metrics=metrics)
         source = Source(file=path.name, metadata=episode.metadata)
+        scored = scored_agents(episode.metadata, episode.agent_person)
         labels = dict(zip(("dataset", "variant", "scenario", "controller"), source.group, strict=True))
         contacts = contacts_table(episode, labels=labels | {"draw": source.draw}, file=path.name)
+        agents = agents.filter(pa.array(scored))
+        contacts = contacts.filter(pa.array(scored[contacts["agent"].to_numpy()]))
         overlapping = pedestrian_overlaps(episode) > 0 if source.group[3] == HUMAN else np.zeros(0)
         overlap = float(overlapping.mean()) if overlapping.size else float("nan")
     except (EpisodeError, KeyError, TypeError) as error:

@@ -76,7 +76,7 @@ def people_as_robots(recording: Recording, strength: float, *, late: float = 0.0
     first = np.ceil(recording.start_time / dt - 1e-6).astype(np.int64)
     last = np.floor(recording.end_time / dt + 1e-6).astype(np.int64)
     steps = int(last.max()) + 1
-    place, velocity, heading = recorded_series(recording, np.arange(n), first, last, steps, dt)
+    place, velocity, heading = recorded_series(recording, np.arange(n), first, last, (0, steps), dt)
     angle = np.nan_to_num(heading)
     cosine, sine = cos(angle), sin(angle)
     way = np.linalg.norm(recording.end - recording.start, axis=1)
