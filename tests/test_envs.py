@@ -190,6 +190,8 @@ def test_what_is_not_allowed_is_named():
     with pytest.raises(ValueError, match="observation = 'image' is not allowed; allowed: flat, dict"):
         CrowdEnv(dataset=TINY, observation="image")
     env = CrowdEnv(dataset=TINY)
+    with pytest.raises(ValueError, match="option person = 'a' is not allowed; allowed: integers >= 0"):
+        env.reset(options={"person": "a"})
     with pytest.raises(ValueError, match="unknown options drw; available: draw, person"):
         env.reset(options={"drw": 1})
     tiny = load_recording(TINY)

@@ -46,7 +46,7 @@ def experiment(policies):
 
 @pytest.fixture
 def whole(experiment, of_both_limits):
-    return replace(experiment, policies=of_both_limits, variants=True)
+    return replace(experiment, policies=of_both_limits, variants=plan.OTHERS)
 
 
 @pytest.fixture(autouse=True)
@@ -88,6 +88,14 @@ def test_variants_change_what_they_say_and_nothing_else(whole):
     assert slow == [("replay_irl", 5), ("mixed", 5)]
     swept = [make_controller(c).switch_distance for c in runs["switch_sweep"].evaluation.controllers]
     assert swept == [d for d in SWEEP for _ in range(2)] and 2.0 not in SWEEP
+
+
+def test_only_the_variants_that_are_asked_for_are_run(experiment):
+    some = replace(experiment, variants=("switch_sweep", "yielding"))
+    assert [run.name for run in some.runs()] == ["default", "yielding", "switch_sweep"]
+    assert [variant.name for variant in some.settings] == ["default", "yielding"]
+    with pytest.raises(ValueError, match=r"variants: 'default' is not allowed; allowed: turn_per_second, capped"):
+        replace(experiment, variants=("default",))
 
 
 def test_variants_may_have_fewer_draws_and_trainings_than_the_default_setting(whole):
@@ -141,7 +149,7 @@ def test_experiment_refuses_no_policy_two_of_a_seed_and_unknown_recordings(polic
     with pytest.raises(ValueError, match=r"training seeds \[1, 1\]; allowed: one of each"):
         Experiment(dataset=TINY, policies=(policies[0], policies[0]))
     with pytest.raises(ValueError, match="there is none for: turn limit per second"):
-        Experiment(dataset=TINY, policies=policies, variants=True)
+        Experiment(dataset=TINY, policies=policies, variants=plan.OTHERS)
     with pytest.raises(ValueError, match="no shipped policy was trained on 'nowhere' with 'continuous' features"):
         shipped_for("nowhere")
 
@@ -226,7 +234,7 @@ def test_other_settings_in_the_same_folder_are_refused_before_anything_runs(expe
     list(reproduce(experiment, tmp_path, n_jobs=1))
     (run_folder(tmp_path, "default")).rename(tmp_path / "runs" / "radii_0.25")
     with pytest.raises(EpisodeError, match=r"pedestrian_radius = 0.15, but 0.08 is asked for"):
-        reproduce(replace(experiment, policies=of_both_limits, variants=True), tmp_path, n_jobs=1)
+        reproduce(replace(experiment, policies=of_both_limits, variants=plan.OTHERS), tmp_path, n_jobs=1)
     assert not run_folder(tmp_path, "default").joinpath("episodes").exists()
 
 

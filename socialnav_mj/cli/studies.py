@@ -56,11 +56,11 @@ class Reproduce:
     """Random choices of the replaced people."""
     seed: int = 100
     """Seed of the first draw; the others count up from it. Draws below 100 are for choosing, not for reporting."""
-    variants: bool = False
-    """Run the other settings and the sweep of the switch distance as well."""
+    variants: tuple[str, ...] = ()
+    """Run other settings as well: turn_per_second, capped (field in the hybrid), yielding (people), unicycle,
+    radii_0.25, radii_0.40, retire, switch_anyone, switch_sweep; or all."""
     variant_draws: int | None = None
-    """Draws of the sweep and of all settings but the capped field, the other turn limit, yielding people and the ideal
-    unicycle; all by default."""
+    """Draws of them, but for turn_per_second and capped; all by default."""
     variant_trainings: int | None = None
     """Trainings of the same; all by default."""
     jobs: int = -1
@@ -74,7 +74,7 @@ class Reproduce:
     def run(self) -> None:
         """Run what is missing behind a bar, then write figures, tables and pages, and copy them if asked to."""
         from socialnav_mj.studies.paper.outputs import PUBLIC, write_outputs
-        from socialnav_mj.studies.paper.plan import Experiment, shipped_for
+        from socialnav_mj.studies.paper.plan import OTHERS, Experiment, shipped_for
 
         experiment = Experiment(
             dataset=self.dataset,
@@ -83,7 +83,7 @@ class Reproduce:
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             draws=self.draws,
             seed=self.seed,
-            variants=self.variants,
+            variants=OTHERS if self.variants == ("all",) else self.variants,
             variant_draws=self.variant_draws,
             variant_trainings=self.variant_trainings,
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from numbers import Integral
 from typing import Any
 
 import gymnasium
@@ -72,6 +73,9 @@ class CrowdEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         options = options or {}
         if unknown := sorted(set(options) - {"draw", "person"}):
             raise ValueError(f"unknown options {', '.join(unknown)}; available: draw, person")
+        for name, value in options.items():
+            if not isinstance(value, Integral) or value < 0:
+                raise ValueError(f"option {name} = {value!r} is not allowed; allowed: integers >= 0")
         recording = self.settings.recording
         draw = int(options.get("draw", self.np_random.integers(2**31)))
         scenario = replace(self.settings.scenario, seed=draw)

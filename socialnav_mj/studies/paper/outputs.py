@@ -72,7 +72,7 @@ def write_outputs(experiment: Experiment, out: Path, *, command: str, n_jobs: in
         found.findings[DEFAULT.name],
         held_out=found.held_out,
         sweep=found.sweep,
-        has_variants=experiment.variants,
+        has_variants=len(experiment.settings) > 1,
         provenance=provenance,
     )
     return write_pages(out, page, found.results, command=command)
@@ -127,7 +127,7 @@ def _draw(experiment: Experiment, found: _Found, folder: Path) -> None:
     draw_figures(found.tables[DEFAULT.name], folder)
     if len(found.sweep) > 1:
         draw_sweep(found.sweep, found.sweep[SWITCH_DISTANCE], folder)
-    if experiment.variants:
+    if len(experiment.settings) > 1:
         draw_variants(found.tables, {variant.name: variant.title for variant in experiment.settings}, folder)
     trained = {seed: load_policy(policy) for seed, policy in experiment.trainings().items()}
     if all("history" in policy.card for policy in trained.values()):

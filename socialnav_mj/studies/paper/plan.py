@@ -64,6 +64,8 @@ VARIANTS: tuple[Variant, ...] = (
     Variant(name="switch_anyone", title="agents count in the switch", who="anyone", runs=(MIXED,)),
 )
 """The default setting first."""
+OTHERS = (*(variant.name for variant in VARIANTS[1:]), SWEEP_RUN)
+"""What there is beside the default setting."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,14 +74,16 @@ class Experiment(Study):
 
     dataset: str
     """Name in the catalogue, or path of a recording."""
-    variants: bool = False
-    """Whether to run the other settings and the sweep of the switch distance as well."""
+    variants: tuple[str, ...] = ()
+    """Which of `OTHERS` to run as well."""
     variant_draws: int | None = None
     """Draws of the sweep and of settings that are not full, the first ones of `draws`; None for all."""
     variant_trainings: int | None = None
     """Trainings of the same, those with the least seeds; None for all."""
 
     def __post_init__(self) -> None:
+        if unknown := [name for name in self.variants if name not in OTHERS]:
+            raise ValueError(f"variants: {unknown[0]!r} is not allowed; allowed: {', '.join(OTHERS)}")
         if self.variant_draws is not None and not 1 <= self.variant_draws <= self.draws:
             raise ValueError(f"variant_draws = {self.variant_draws} is not allowed; allowed: 1 to draws = {self.draws}")
         if self.variant_trainings is not None and self.variant_trainings < 1:
@@ -106,8 +110,8 @@ class Experiment(Study):
 
     @property
     def settings(self) -> tuple[Variant, ...]:
-        """The default setting, and the others if they are asked for."""
-        return VARIANTS if self.variants else VARIANTS[:1]
+        """The default setting, and those of the others that are asked for."""
+        return tuple(variant for variant in VARIANTS if variant.name in (DEFAULT.name, *self.variants))
 
     def trainings(self, variant: Variant = DEFAULT) -> dict[int, str]:
         """Policies of a setting.
@@ -175,7 +179,7 @@ class Experiment(Study):
         for variant in self.settings:
             own = tuple(entry for entry in self.roster(variant) if entry.method in (*variant.runs, HUMAN))
             result.append(self._run(variant.name, own, variant.task_kwargs))
-        if self.variants:
+        if SWEEP_RUN in self.variants:
             swept = tuple(entry for distance in SWEEP for entry in self.sweep_roster(distance))
             result.append(self._run(SWEEP_RUN, (*swept, Entry(controller=HUMAN, method=HUMAN)), {}))
         return result
