@@ -84,9 +84,8 @@ def main() -> None:
             ratio = median(one["run"] / other["run"] for one, other in zip(own, first, strict=True))
             same = "yes" if {one["went"] for one in (*own, *first)} == {first[0]["went"]} else "no"
             build = median(one["build"] for one in own)
-            lines.append(
-                f"| `{commit}` | {share:g} | {run:.2f} | {ratio:.2f} | {own[0]['time'] / run:.0f} | {build:.2f} | {same} |"
-            )
+            cells = (f"`{commit}`", f"{share:g}", f"{run:.2f}", f"{ratio:.2f}", f"{own[0]['time'] / run:.0f}")
+            lines.append(f"| {' | '.join((*cells, f'{build:.2f}', same))} |")
     sys.stdout.write("\n".join(lines) + "\n")
 
 
