@@ -1,5 +1,6 @@
 """Scenes in worker processes: the bits of single crowds, draws of their own, clear errors, and nothing left behind."""
 
+import json
 import os
 import signal
 import subprocess
@@ -7,7 +8,7 @@ import sys
 import textwrap
 import time
 from contextlib import closing
-from functools import cache
+from functools import cache, partial
 from multiprocessing import active_children
 from pathlib import Path
 from threading import Lock
@@ -21,6 +22,8 @@ from scenes import TINY, recording_of, walk
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
+from socialnav_mj import throughput
+from socialnav_mj.cli import main
 from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.envs.scenes import ScenesVecEnv, scene_seed
 from socialnav_mj.envs.worker import WorkerError
@@ -256,6 +259,23 @@ def test_ppo_learns_in_scenes(pair):
     model.learn(2 * 16 * pair.num_envs)
     assert model.num_timesteps == 2 * 16 * pair.num_envs
     assert any((a != b).any() for a, b in zip(before, model.policy.parameters(), strict=True))
+
+
+def test_bench_sets_workers_beside_one_process(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(throughput, "measure_scenes", partial(throughput.measure_scenes, control_steps=20))
+    out = tmp_path / "bench.json"
+    main(
+        ["bench", "--scenes", "1", "--dataset", str(TINY), "--scenarios", "4", "--repetitions", "2", "--out", str(out)]
+    )
+    assert "agent-steps a second" in capsys.readouterr().out
+    content = json.loads(out.read_text(encoding="utf-8"))
+    (row,) = content["scenes"]
+    assert content["recording"]["name"] == "tiny" and (row["scenario"], row["n_scenes"]) == ("scenario_4", 1)
+    assert len(row["agent_steps"]) == 2 and row["agent_steps"][0] > 20
+    for ratio, over, under in (("ratio", "workers", "one"), ("cpu_ratio", "workers_cpu", "one_cpu")):
+        pairs = zip(row[over]["values"], row[under]["values"], strict=True)
+        assert row[ratio]["values"] == pytest.approx([a / b for a, b in pairs]) and len(row[ratio]["values"]) == 2
+        assert 0.0 < row[ratio]["low"] <= row[ratio]["middle"] <= row[ratio]["high"]
 
 
 # Errors
