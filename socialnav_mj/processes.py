@@ -77,7 +77,7 @@ def in_processes(
     """
     if (cluster := active_cluster()) is not None:
         return calls_on(cluster, function, arguments, n_jobs=n_jobs)
-    with _held_back(STOPPING):
+    with held_back(STOPPING):
         # Processes start here and inherit it: signals are this process's to handle, which then ends them.
         results: Iterator[Result] = Parallel(
             n_jobs=n_jobs, return_as="generator_unordered", initializer=_serve, initargs=(os.getpid(),)
@@ -86,8 +86,12 @@ def in_processes(
 
 
 @contextmanager
-def _held_back(signals: Iterable[signal.Signals]) -> Iterator[None]:
-    """Hold signals back for a moment: they come when the block has ended; processes started in it never get them."""
+def held_back(signals: Iterable[signal.Signals]) -> Iterator[None]:
+    """Hold signals back for a moment: they come when the block has ended; processes started in it never get them.
+
+    Args:
+        signals: To be held back.
+    """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         yield

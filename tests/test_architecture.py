@@ -51,7 +51,7 @@ ROWS = (
     {"studies"},
     {"studies.paper", "studies.leave_one_out"},
     {"studies.gains", "studies.leaderboard", "studies.reaction", "studies.plant"},
-    {"benchmark", "growth", "comparison", "resimulation", "verification", "cli", "__main__"},
+    {"benchmark", "growth", "throughput", "comparison", "resimulation", "verification", "cli", "__main__"},
 )
 # A study uses what all studies share, and no other study.
 STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}
@@ -92,7 +92,7 @@ ONLY_IN = {
     "matplotlib": {"report", "studies.paper", "studies.gains", "studies.leaderboard"},
     "rerun": {"trace"},
     "torch": {"learning"},
-    "stable_baselines3": {"envs", "learning", "controllers"},
+    "stable_baselines3": {"envs", "learning", "controllers", "throughput"},
     "gymnasium": {"envs", "learning"},
     "pettingzoo": {"envs"},
     "numba": {"controllers"},

@@ -82,6 +82,8 @@ class Bench:
     """Controllers whose own cost for 60 agents is measured, in a made-up crowd; then no episodes are."""
     growth: tuple[int, ...] = ()
     """Sizes of made-up crowds of robots in which an agent-step is measured, once each; then no episodes are."""
+    scenes: tuple[int, ...] = ()
+    """Numbers of scenes, each in a worker process, beside the same in one; needs the extra `train`."""
     seed: int = 0
     """Seed of the draw."""
     repetitions: int = 3
@@ -95,13 +97,15 @@ class Bench:
     by."""
 
     def run(self) -> None:
-        """Measure scenarios, controllers or growth, or compare, print a table, and write the file if one is named."""
+        """Measure what is asked for, or compare, print a table, and write the file if one is named."""
         if self.at_most is not None and (self.compare is None or not self.at_most > 0.0):
             raise ValueError(f"--at-most {self.at_most:g} is not allowed; allowed: numbers > 0, with --compare")
         if self.compare is not None:
             self._compare(*self.compare)
         elif self.growth:
             self._measure_growth()
+        elif self.scenes:
+            self._measure_scenes()
         elif self.controllers:
             self._measure_controllers()
         else:
@@ -129,6 +133,41 @@ class Bench:
             table.add_row(f"{row.n_agents}", f"{row.build_cpu:.2f}", *times, *ends)
         console.print(table)
         self._write({"growth": [asdict(row) for row in rows]})
+
+    def _measure_scenes(self) -> None:
+        from socialnav_mj.provenance import recording_metadata
+        from socialnav_mj.recordings import load_recording
+        from socialnav_mj.throughput import measure_scenes
+
+        recording = load_recording(self.dataset, data_dir=self.data_dir)
+        measured = []
+        for number in self.scenarios:
+            for count in self.scenes:
+                with errors.status(f"scenario {number}, scenes: {count}"):
+                    measured.append(
+                        measure_scenes(
+                            recording, f"scenario_{number}", count, seed=self.seed, repetitions=self.repetitions
+                        )
+                    )
+        table = Table(title=f"{recording.name}, random actions, agent-steps a second", title_justify="left")
+        table.add_column("")
+        rows: dict[str, list[str]] = {}
+        for found in measured:
+            table.add_column(f"{found.scenario}\nscenes: {found.n_scenes}", justify="right")
+            for label, text in {
+                "one process [1/s]": f"{found.one.middle:.0f}",
+                "a worker each [1/s]": f"{found.workers.middle:.0f}",
+                "ratio": str(found.ratio),
+                "one process [1/CPU s]": f"{found.one_cpu.middle:.0f}",
+                "a worker each [1/CPU s]": f"{found.workers_cpu.middle:.0f}",
+                "ratio of these": str(found.cpu_ratio),
+            }.items():
+                rows.setdefault(label, []).append(text)
+        for label, cells in rows.items():
+            table.add_row(label, *cells)
+        console.print(table)
+        content = {"settings": {"seed": self.seed}, "scenes": [asdict(found) for found in measured]}
+        self._write({"recording": recording_metadata(recording), **content})
 
     def _compare(self, before: Path, after: Path) -> None:
         from socialnav_mj.comparison import compare

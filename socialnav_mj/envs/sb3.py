@@ -8,14 +8,12 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from socialnav_mj.config import Robot, Scenario, TurnLimit
-from socialnav_mj.controllers import make_controller
 from socialnav_mj.environment import Environment
-from socialnav_mj.envs.crowd import UNDER_WAY, Crowd
-from socialnav_mj.envs.spaces import action_space, observation_space, row_of
-from socialnav_mj.episode import Outcome
+from socialnav_mj.envs.crowd import UNDER_WAY
+from socialnav_mj.envs.guided import GuidedCrowd, infos_of
+from socialnav_mj.envs.spaces import action_space, observation_space
 from socialnav_mj.features import FeatureSet
-from socialnav_mj.features.seen import Flat
-from socialnav_mj.geometry import Array, twist_of_wheel_speed
+from socialnav_mj.geometry import Array
 from socialnav_mj.recordings import Recording
 
 
@@ -55,29 +53,24 @@ class CrowdVecEnv(VecEnv):
             guide: Controller that `guide_action` asks.
             seed: Seed from which the seeds of all draws are taken.
         """
-        scenario = Scenario(
-            robot=Robot(radius=robot_radius),
+        self._crowd = GuidedCrowd(
+            recordings,
+            features,
+            shares=shares,
+            n_slots=n_slots,
+            robot_radius=robot_radius,
             pedestrian_radius=pedestrian_radius,
             turn_limit=turn_limit,
-            on_collision="retire",
+            guide=guide,
+            seed=seed,
         )
-        self._guide = make_controller(guide)
-        self._observer = Flat(features)
-        self._crowd = Crowd(recordings, self._observer, scenario, shares=shares, n_slots=n_slots, seed=seed)
         self._actions = np.zeros((n_slots, 2))
-        self._note_scene()
-        super().__init__(n_slots, observation_space(self._observer), action_space())
+        super().__init__(n_slots, observation_space(self._crowd.observer), action_space())
 
     @property
     def environment(self) -> Environment:
         """The scene that is being played."""
         return self._crowd.environment
-
-    def _note_scene(self) -> None:
-        """The scene has just been drawn, or is to be played from its beginning."""
-        self._guide.reset(self._crowd.limits, seed=self.environment.task.scenario.seed)
-        self._asked: list[bool] = []
-        self._is_asked = False
 
     def reset(self) -> NDArray[np.float32]:
         """Begin the scene.
@@ -85,7 +78,6 @@ class CrowdVecEnv(VecEnv):
         Returns:
             Shape (n_slots, state size).
         """
-        self._asked = []
         return self._crowd.begin()[""]
 
     def state(self) -> dict[str, Any]:
@@ -94,7 +86,7 @@ class CrowdVecEnv(VecEnv):
         Returns:
             Plain values and arrays for `restore`.
         """
-        return {**self._crowd.state(), "asked": np.array(self._asked, dtype=bool)}
+        return self._crowd.state()
 
     def restore(self, state: Mapping[str, Any]) -> NDArray[np.float32]:
         """Draw a scene again and do in it what was done; simulations are repeatable to the bit.
@@ -105,15 +97,7 @@ class CrowdVecEnv(VecEnv):
         Returns:
             What the agents see then, shape (n_slots, state size).
         """
-        self._crowd.restore(state)
-        self._note_scene()
-        seen = self.reset()
-        for action, asked in zip(np.asarray(state["actions"]), np.asarray(state["asked"]), strict=True):
-            if asked:
-                self.guide_action()  # a guide may have a memory
-            self.step_async(action)
-            seen, *_ = self.step_wait()
-        return seen
+        return self._crowd.bring_back(state)[""]
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions of the next step.
@@ -129,20 +113,9 @@ class CrowdVecEnv(VecEnv):
         Returns:
             States (n_slots, size), rewards (n_slots,), dones (n_slots,), infos.
         """
-        scene = self.environment
-        self._asked.append(self._is_asked)
-        self._is_asked = False
         step = self._crowd.step(self._actions)
-        if self.environment is not scene:
-            self._note_scene()
-        infos: list[dict[str, Any]] = [{"active": active} for active in step.active.tolist()]
-        dones = step.outcome != UNDER_WAY
-        for slot in np.flatnonzero(dones):
-            outcome = int(step.outcome[slot])
-            infos[slot]["terminal_observation"] = self._observer.ended(row_of(step.final, slot), outcome)[""]
-            infos[slot]["TimeLimit.truncated"] = outcome == Outcome.TIMED_OUT
-            infos[slot]["outcome"] = outcome
-        return step.seen[""], step.reward, dones, infos
+        infos = infos_of(step.active, step.outcome, self._crowd.last_states(step))
+        return step.seen[""], step.reward, step.outcome != UNDER_WAY, infos
 
     def guide_action(self) -> Array:
         """What the guide would do now.
@@ -150,13 +123,7 @@ class CrowdVecEnv(VecEnv):
         Returns:
             (speed, turn) in [-1, 1], shape (n_slots, 2); of no meaning in empty slots.
         """
-        self._is_asked = True
-        limits, task = self._crowd.limits, self.environment.task
-        wheel_speed = self._guide.act(task.get_observation(self.environment.physics))
-        twist = twist_of_wheel_speed(wheel_speed, wheel_radius=limits.wheel_radius, track=limits.track)
-        action = np.zeros((self.num_envs, 2))
-        action[: len(twist)] = limits.action_of_twist(twist)
-        return action
+        return self._crowd.guide_action()
 
     def close(self) -> None:
         """Nothing to close."""
