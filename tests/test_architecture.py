@@ -42,7 +42,7 @@ ROWS = (
     {"suite"},
     {"tasks"},
     {"controllers"},
-    {"recorder", "rollout", "human", "resumption", "evaluation"},
+    {"parts", "recorder", "rollout", "human", "resumption", "evaluation"},
     {"metrics"},
     {"trace", "film", "export"},
     {"report"},
