@@ -269,7 +269,7 @@ def test_readmes_results_are_the_published_ones():
         re.findall(r"^\| \(\w+\) \|.*\*\*(\w+)\*\* \| [^|]* \|$", (folder / "README.md").read_text(), re.MULTILINE)
     )
     assert f"Of {verdicts.total()} claims {verdicts['holds']} hold, {verdicts['fails']} fail and" in text
-    assert f"{verdicts['undecided']} are undecided." in text
+    assert f"and {verdicts['undecided']} {'is' if verdicts['undecided'] == 1 else 'are'} undecided" in text
     claims = (folder / "README.md").read_text(encoding="utf-8")
     assert re.search(r"\| \(a\) \|.*mixed policy has the highest success.*\*\*fails\*\*", claims)
     assert re.search(r"\| \(b3\) \|.*Potential field agents intrude most.*\*\*holds\*\*", claims)

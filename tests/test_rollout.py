@@ -292,14 +292,12 @@ def test_metadata_hold_the_resolved_configuration_as_json():
 
 
 def test_a_record_that_no_file_may_hold_is_refused_when_it_has_grown_too_large(monkeypatch):
+    """17 samples of 4 agents of 80 bytes and of the 2 of 6 people of 40 bytes who have appeared."""
     environment = busy()
-    n, m = environment.task.cast.n_agents, environment.task.cast.n_pedestrians
-    monkeypatch.setattr("socialnav_mj.recorder.MAX_BYTES", 10 * (80 * n + 40 * m))
-    with pytest.raises(
-        EpisodeError, match=rf"at 2 s the record of {n} agents and {m} people.*in shorter parts, with --part"
-    ):
+    monkeypatch.setattr("socialnav_mj.recorder.MAX_BYTES", 16 * (80 * 4 + 40 * 2))
+    with pytest.raises(EpisodeError, match=r"at 3 s the record of 4 agents and 2 people takes 6800 bytes.*with --part"):
         rollout(environment, GoStraight())
-    assert environment.task.step == 10
+    assert environment.task.step == 16
 
 
 def test_the_size_at_which_a_record_is_refused_is_what_its_samples_take():
