@@ -98,9 +98,9 @@ class Parting:
         Returns:
             The part; the next one begins after it.
         """
-        cast = self._cast
+        cast, is_whole = self._cast, is_last and not self._number
         scored = (end > self._since) & (end <= step) | is_last & (end == NOT_YET)
-        begin = int(spawn[scored & (spawn != NOT_YET)].min(initial=step)) if self._number or not is_last else 0
+        begin = 0 if is_whole else int(spawn[scored & (spawn != NOT_YET)].min(initial=step))
         there = (spawn != NOT_YET) & (spawn <= step) & ((end == NOT_YET) | (end >= begin))
         agents = np.flatnonzero(there | scored)
         people = (cast.pedestrian_first_step <= step) & (cast.pedestrian_last_step >= begin)
@@ -111,7 +111,7 @@ class Parting:
             end=step,
             agents=agents,
             scored=scored[agents],
-            pedestrians=np.flatnonzero(people) if self._number or not is_last else np.arange(cast.n_pedestrians),
+            pedestrians=np.flatnonzero(people | is_whole),
         )
         self._since, self._number = step, self._number + 1
         return part

@@ -17,7 +17,37 @@ from socialnav_mj.geometry import Array
 from socialnav_mj.recordings import Recording
 
 
-class CrowdVecEnv(VecEnv):
+class PlainVecEnv(VecEnv):
+    """What crowds are as environments, however they are run: seeded once, and wrapped in nothing."""
+
+    def seed(self, seed: int | None = None) -> list[int | None]:
+        """Leave the draws as they are: they are seeded once, when it is made.
+
+        stable-baselines3 seeds its environments with the learner's seed, which would repeat the first scene's draw and,
+        after a resume, the scenes of the training's beginning.
+
+        Args:
+            seed: Not used.
+
+        Returns:
+            None for every environment.
+        """
+        return [None] * self.num_envs
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """No environment is wrapped.
+
+        Args:
+            wrapper_class: Not used.
+            indices: Which environments.
+
+        Returns:
+            False for each.
+        """
+        return [False for _ in self._get_indices(indices)]
+
+
+class CrowdVecEnv(PlainVecEnv):
     """Agents of one scene after another, each for as long as its run lasts.
 
     An observation is a state of `socialnav_mj.features`. A slot without an agent stands still: its observation is 0 and
@@ -128,20 +158,6 @@ class CrowdVecEnv(VecEnv):
     def close(self) -> None:
         """Nothing to close."""
 
-    def seed(self, seed: int | None = None) -> list[int | None]:
-        """Leave the draws as they are: they are seeded once, when the crowd is made.
-
-        stable-baselines3 seeds its environments with the learner's seed, which would repeat the first scene's draw and,
-        after a resume, the scenes of the training's beginning.
-
-        Args:
-            seed: Not used.
-
-        Returns:
-            None for every environment.
-        """
-        return [None] * self.num_envs
-
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of this object, for every environment.
 
@@ -180,15 +196,3 @@ class CrowdVecEnv(VecEnv):
             NotImplementedError: Always.
         """
         raise NotImplementedError(f"a crowd has no method {method_name!r} for each of its environments")
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """No environment is wrapped.
-
-        Args:
-            wrapper_class: Not used.
-            indices: Which environments.
-
-        Returns:
-            False for each.
-        """
-        return [False for _ in self._get_indices(indices)]

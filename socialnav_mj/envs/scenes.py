@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv
 
 from socialnav_mj.config import Robot, Scenario, TurnLimit
 from socialnav_mj.envs.crowd import UNDER_WAY
 from socialnav_mj.envs.guided import GuidedCrowd, infos_of
+from socialnav_mj.envs.sb3 import PlainVecEnv
 from socialnav_mj.envs.spaces import action_space, observation_space
 from socialnav_mj.envs.worker import SharedSlots, command
 from socialnav_mj.envs.workers import Workers
@@ -35,7 +35,7 @@ def scene_seed(seed: int, scene: int) -> int:
     return int(np.random.SeedSequence(seed, spawn_key=(scene,)).generate_state(1, np.uint64)[0])
 
 
-class ScenesVecEnv(VecEnv):
+class ScenesVecEnv(PlainVecEnv):
     """Crowds side by side, each as a `CrowdVecEnv` plays it, in a process of its own.
 
     Environment `k * n_slots + i` is slot i of scene k. All scenes make a step at once, and each begins its next draw
@@ -195,17 +195,6 @@ class ScenesVecEnv(VecEnv):
         """End the workers; everything but this raises from then on."""
         self._workers.close()
 
-    def seed(self, seed: int | None = None) -> list[int | None]:
-        """Leave the draws as they are: they are seeded once, when the scenes are made; see `CrowdVecEnv.seed`.
-
-        Args:
-            seed: Not used.
-
-        Returns:
-            None for every environment.
-        """
-        return [None] * self.num_envs
-
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of the crowds (`socialnav_mj.envs.guided.GuidedCrowd`), for every environment.
 
@@ -249,18 +238,6 @@ class ScenesVecEnv(VecEnv):
             WorkerError: If it raises, or its value cannot travel between processes, or a worker has died.
         """
         return self._ask("call", method_name, args, kwargs, indices=indices)
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """No environment is wrapped.
-
-        Args:
-            wrapper_class: Not used.
-            indices: Which environments.
-
-        Returns:
-            False for each.
-        """
-        return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """Nothing is drawn.
