@@ -89,7 +89,7 @@ ONLY_IN = {
         "cli",
         "socialnav_mj",
     },
-    "matplotlib": {"report", "studies.paper", "studies.gains", "studies.leaderboard"},
+    "matplotlib": {"report", "studies", "studies.paper", "studies.gains", "studies.leaderboard"},
     "rerun": {"trace"},
     "torch": {"learning"},
     "stable_baselines3": {"envs", "learning", "controllers", "throughput"},

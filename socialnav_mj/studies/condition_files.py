@@ -7,7 +7,7 @@ from typing import Any
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.studies.conditions import Comparison, ConditionStudy, compare
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
-from socialnav_mj.studies.slopes import draw_slopes
+from socialnav_mj.studies.slopes import draw_overview, draw_slopes
 from socialnav_mj.studies.study import read_runs
 
 
@@ -31,7 +31,7 @@ def write_conditions(
         out: Its folder; gets tables/, figures/, README.md, report.html and provenance.json.
         measures: What is told of every controller and condition.
         ranked: Of these, by which the ranking of controllers is compared.
-        slopes: Measure and label of each row of the figures.
+        slopes: Measure and label of each row of the figures; the overview has the first.
         figure: Beginning of the figures' names, before the recording's.
         page: Text of README.md, of the comparisons and `provenance`.
         tables: Name of a table beside those of all studies: its rows.
@@ -53,6 +53,7 @@ def write_conditions(
     for name, rows in tables.items():
         write_csv(out / "tables" / f"{name}.csv", rows(found))
     for own in found:
+        draw_overview(own, *slopes[0], out / "figures", f"overview_{own.recording}")
         draw_slopes(own, slopes, out / "figures", f"{figure}_{own.recording}")
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     provenance = write_provenance(study, results, recordings, out, command=command)

@@ -1,5 +1,6 @@
 """How methods and scenarios look and are named in the figures and pages of all studies."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -31,7 +32,7 @@ LOOKS: dict[str, Look] = {
 SHADES = ("#40004B", "#762A83", "#A477B7", "#CDB2D8")
 """Dark to light purple, for whatever is no method, and no method's colour; with MARKERS and LINES beside them."""
 MARKERS = ("o", "s", "D", "^")
-LINES = ("-", "--", "-.", ":")
+LINES: tuple[Literal["-", "--", "-.", ":"], ...] = ("-", "--", "-.", ":")
 
 SCENARIO_TITLES = {
     "scenario_1": "scenario 1: 10 % agents",
@@ -40,6 +41,32 @@ SCENARIO_TITLES = {
     "scenario_4": "scenario 4: 90 % agents",
 }
 """Task: its number, and the share of people whom agents replace."""
+
+
+def looks_of(controllers: Sequence[str]) -> dict[str, Look]:
+    """How controllers are drawn: the paper's methods as in all figures, the others in shades, markers and lines.
+
+    Args:
+        controllers: As `make_controller` takes them; `hybrid` is the paper's mixed policy.
+
+    Returns:
+        Of each controller.
+    """
+    methods = {controller: LOOKS.get(MIXED if controller == "hybrid" else controller) for controller in controllers}
+    others = [controller for controller, method in methods.items() if method is None]
+    return {controller: method or _shade(controller, others) for controller, method in methods.items()}
+
+
+def _shade(label: str, others: Sequence[str]) -> Look:
+    k = others.index(label)
+    row = k // len(SHADES)
+    return Look(
+        label=label,
+        colour=SHADES[k % len(SHADES)],
+        hatch="",
+        marker=MARKERS[row % len(MARKERS)],
+        line=LINES[row % len(LINES)],
+    )
 
 
 def short_title(scenario: str, place: int) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.style import new_figure, save, style
 from socialnav_mj.studies.leaderboard.board import Board
-from socialnav_mj.studies.looks import LINES, MARKERS, SHADES, short_title
+from socialnav_mj.studies.looks import LINES, looks_of, short_title
 
 _AXES = (
     ("intrusion_share_of_steps", "share of steps within 1.2 m"),
@@ -27,7 +27,7 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
         Paths of the files.
     """
     board = boards[0]
-    scenarios = board.scenarios
+    scenarios, looks = board.scenarios, looks_of(board.controllers)
     with style():
         figure = new_figure(1.6 + 2.1 * len(_AXES))
         grid = figure.subplots(len(_AXES), len(scenarios), sharex="row", sharey="col", squeeze=False)
@@ -39,8 +39,8 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
                         board.mean(scenario, k, "success"),
                         yerr=_reach(board, scenario, name),
                         linestyle="",
-                        color=SHADES[k % len(SHADES)],
-                        marker=MARKERS[k // len(SHADES) % len(MARKERS)],
+                        color=looks[name].colour,
+                        marker=looks[name].marker,
                         markeredgecolor="black",
                         markeredgewidth=0.4,
                         label=f"{k + 1} {name}",

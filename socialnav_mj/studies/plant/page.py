@@ -87,7 +87,14 @@ def plant_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any]) ->
     lines += ["## What would a kinematic simulator have told wrongly?", "", *_verdicts(found)]
     lines += ["## Does the ranking hold?", "", *_ranking(found)]
     for own in found:
-        lines += [f"## {own.recording}", "", f"![plants](figures/plants_{own.recording}.png)", ""]
+        lines += [
+            f"## {own.recording}",
+            "",
+            f"![overview](figures/overview_{own.recording}.png)",
+            "",
+            f"![plants](figures/plants_{own.recording}.png)",
+            "",
+        ]
         for scenario in own.scenarios:
             lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(own, scenario)]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"

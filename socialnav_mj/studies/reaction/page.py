@@ -34,7 +34,14 @@ def reaction_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any])
     lines += ["## Does the ranking hold?", "", *_ranking(found)]
     lines += ["## How far controllers lie apart", "", *_spread(found)]
     for own in found:
-        lines += [f"## {own.recording}", "", f"![slopes](figures/slopes_{own.recording}.png)", ""]
+        lines += [
+            f"## {own.recording}",
+            "",
+            f"![overview](figures/overview_{own.recording}.png)",
+            "",
+            f"![slopes](figures/slopes_{own.recording}.png)",
+            "",
+        ]
         for scenario in own.scenarios:
             lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(own, scenario)]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
