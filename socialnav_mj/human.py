@@ -1,5 +1,6 @@
 """Episodes in which the replaced people take the place of the agents, on their own recorded tracks: the human row."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
@@ -123,7 +124,7 @@ def _episode(
         ),
     ]
     n = len(agents)
-    contacts, ghosts = _contacts(recording, scenario, people, np.concatenate([position, there], axis=1))
+    contacts, ghosts = _contacts(recording, scenario, people, np.concatenate([position, there], axis=1), part.begin)
     contacts = [one for one in contacts if (part.begin - 0.5) * dt <= one.time <= (part.end + 1) * dt]
     finished = end[agents] <= part.end
     return Episode(
@@ -183,31 +184,39 @@ def _yaw_rate(heading: Array, dt: float) -> Array:
 
 
 def _contacts(
-    recording: Recording, scenario: Scenario, people: list[_Person], position: Array
+    recording: Recording, scenario: Scenario, people: list[_Person], position: Array, begin: int
 ) -> tuple[list[Contact], list[int]]:
-    """Touches as each agent among two people would have felt them, without forces; and agents on whom one appeared."""
+    """Touches as each agent among two people would have felt them, without forces; and agents on whom one appeared.
+
+    Row 0 of `position` is control step `begin`.
+    """
     limit, dt, h = scenario.contact_distance, scenario.control_timestep, scenario.physics_timestep
-    pairs = _close_pairs(position, limit + _FASTEST_APPROACH * dt)
     contacts: list[Contact] = []
     ghosts: list[int] = []
-    for a, b in pairs:
+    for (a, b), near in _close_pairs(position, limit + _FASTEST_APPROACH * dt).items():
         one, two = people[a], people[b]
         if one.kind == two.kind == Partner.PEDESTRIAN:
             continue
         first, end = max(one.first, two.first), min(one.end, two.end)
         times = np.arange(first * scenario.n_sub_steps, end * scenario.n_sub_steps) * h
-        x, u, facing = recording.person(one.index).at(times)
-        y, w, other_facing = recording.person(two.index).at(times)
-        apart = np.linalg.norm(y - x, axis=1)
-        for start, stop in _runs(apart <= limit, merge=round(scenario.contact_rearm_time / h)):
+        # Nobody touches between two control steps who is near at neither; what lies outside `position` is looked at
+        # all the same, since a touch that is there at its ends may have begun outside.
+        steps, rows = np.arange(first, end), begin + np.array(near)
+        unknown = (steps < begin) | (steps >= begin + len(position) - 1)
+        looked_at = np.flatnonzero(np.repeat(np.isin(steps, [rows - 1, rows]) | unknown, scenario.n_sub_steps))
+        apart = _place(recording, two, times[looked_at]) - _place(recording, one, times[looked_at])
+        touching = np.zeros(len(times), dtype=bool)
+        touching[looked_at] = np.linalg.norm(apart, axis=1) <= limit
+        for start, stop in _runs(touching, merge=round(scenario.contact_rearm_time / h)):
             if start == 0:
                 if two.kind == Partner.PEDESTRIAN and two.first > one.first:
                     ghosts.append(one.row)
                 continue
-            normal = (y[start] - x[start]) / max(float(apart[start]), 1e-9)
-            before = start - 1
-            sides = [(one, two, normal, facing[before], u[before], w[before])]
-            sides.append((two, one, -normal, other_facing[before], w[before], u[before]))
+            around = times[start - 1 : start + 1]
+            x, u, facing = recording.person(one.index).at(around)
+            y, w, other_facing = recording.person(two.index).at(around)
+            normal = (y[1] - x[1]) / max(float(np.linalg.norm(y[1:] - x[1:], axis=1)[0]), 1e-9)
+            sides = [(one, two, normal, facing[0], u[0], w[0]), (two, one, -normal, other_facing[0], w[0], u[0])]
             contacts += [
                 Contact(
                     time=float(times[start]),
@@ -215,7 +224,7 @@ def _contacts(
                     partner_kind=other.kind,
                     partner=other.row,
                     duration=(stop - start) * h,
-                    position=0.5 * (x[start] + y[start]),
+                    position=0.5 * (x[1] + y[1]),
                     normal=direction,
                     agent_heading=float(heading),
                     agent_velocity=own_velocity,
@@ -228,16 +237,21 @@ def _contacts(
     return contacts, ghosts
 
 
-def _close_pairs(position: Array, distance: float) -> list[tuple[int, int]]:
-    """Pairs of columns that are nearer than a distance at any sample."""
-    pairs: set[tuple[int, int]] = set()
-    for row in position:
+def _place(recording: Recording, person: _Person, times: Array) -> Array:
+    return recording.curves.position_and_velocity(np.full(len(times), person.index), times)[0]
+
+
+def _close_pairs(position: Array, distance: float) -> dict[tuple[int, int], list[int]]:
+    """Pairs of columns that are nearer than a distance at any sample, ascending, and at which samples."""
+    pairs: defaultdict[tuple[int, int], list[int]] = defaultdict(list)
+    for k, row in enumerate(position):
         present = np.flatnonzero(~np.isnan(row[:, 0]))
         here = row[present]
         near = np.linalg.norm(here[:, None] - here, axis=-1) < distance
         i, j = np.nonzero(np.triu(near, 1))
-        pairs.update(zip(present[i].tolist(), present[j].tolist(), strict=True))
-    return sorted(pairs)
+        for pair in zip(present[i].tolist(), present[j].tolist(), strict=True):
+            pairs[pair].append(k)
+    return dict(sorted(pairs.items()))
 
 
 def _runs(touching: NDArray[np.bool_], *, merge: int) -> list[tuple[int, int]]:
