@@ -198,7 +198,7 @@ def _contacts(
         if one.kind == two.kind == Partner.PEDESTRIAN:
             continue
         first, end = max(one.first, two.first), min(one.end, two.end)
-        times = np.arange(first * scenario.n_sub_steps, end * scenario.n_sub_steps) * h
+        times = np.arange(first * scenario.n_sub_steps, end * scenario.n_sub_steps, dtype=float) * h
         # Nobody touches between two control steps who is near at neither; what lies outside `position` is looked at
         # all the same, since a touch that is there at its ends may have begun outside.
         steps, rows = np.arange(first, end), begin + np.array(near)
