@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import kendalltau
 
 from socialnav_mj.cli import main
 from socialnav_mj.config import Scenario
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.report import style
 from socialnav_mj.studies.conditions import ConditionStudy
-from socialnav_mj.studies.kendall import kendall
+from socialnav_mj.studies.kendall import kendall, tau_b
 from socialnav_mj.studies.plant.study import PLANTS
 from socialnav_mj.studies.reaction.people_as_robots import people_as_robots
 from socialnav_mj.studies.reaction.study import LEVELS
@@ -36,6 +37,15 @@ def test_tau_of_clear_rankings_is_that_of_the_means_and_of_noise_wide():
     assert noise.high - noise.low > 0.5
     few = kendall(clear[:2], clear[:2])
     assert few.mean == 1.0 and np.isnan(few.low)
+
+
+def test_kendalls_tau_is_scipys_also_with_ties():
+    random = np.random.default_rng(1)
+    one, two = random.integers(0, 4, size=(2, 200, 6)).astype(float)
+    two[0] = 1.0
+    expected = [kendalltau(a, b).statistic for a, b in zip(one, two, strict=True)]
+    assert np.isnan(expected[0])
+    np.testing.assert_allclose(tau_b(one, two), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import kendalltau
 
 from socialnav_mj.geometry import Array
 from socialnav_mj.report.intervals import CONFIDENCE, LEAST
@@ -39,17 +38,29 @@ def kendall(one: Array, two: Array, *, seed: int = 0) -> Tau:
     n = len(one)
     if not n:
         return Tau(mean=np.nan, low=np.nan, high=np.nan)
-    mean = _tau(one.mean(axis=0), two.mean(axis=0))
+    mean = float(tau_b(one.mean(axis=0), two.mean(axis=0)))
     if n < LEAST:
         return Tau(mean=mean, low=np.nan, high=np.nan)
     weights = np.random.default_rng(seed).multinomial(n, np.full(n, 1.0 / n), size=RESAMPLES)
-    again = np.array([_tau(*pair) for pair in zip(weights @ one, weights @ two, strict=True)])
+    again = tau_b(weights @ one, weights @ two)
     again = again[np.isfinite(again)]
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(again, (tail, 1.0 - tail)) if again.size else (np.nan, np.nan)
     return Tau(mean=mean, low=float(low), high=float(high))
 
 
-def _tau(one: Array, two: Array) -> float:
-    # Means that differ by rounding alone are equal.
-    return float(kendalltau(one.round(9), two.round(9)).statistic)
+def tau_b(one: Array, two: Array) -> Array:
+    """Kendall's tau-b of many pairs of lists at once (Kendall 1945, doi:10.1093/biomet/33.3.239).
+
+    Args:
+        one: Values, shape (..., k); those that differ by rounding alone are equal.
+        two: As many.
+
+    Returns:
+        Shape (...); NaN where all values of one list are equal.
+    """
+    i, j = np.triu_indices(one.shape[-1], 1)
+    first, second = (np.sign(values[..., i] - values[..., j]) for values in (one.round(9), two.round(9)))
+    untied = np.count_nonzero(first, axis=-1) * np.count_nonzero(second, axis=-1)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((first * second).sum(axis=-1) / np.sqrt(untied))
