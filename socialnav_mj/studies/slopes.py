@@ -12,12 +12,12 @@ from socialnav_mj.report.style import new_figure, save, style
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.looks import looks_of, short_title
 
-_BESIDE = 0.05
-"""By which neighbouring lines are moved apart, as a share of the way between two conditions."""
+_BESIDE = 0.1
+"""By which the outermost lines are moved to either side, as a share of the way between two conditions."""
 _FOR_NUMBERS = 0.6
 """Room to the right of the lines for their numbers, in ways between two conditions."""
-_FOR_NAMES = 0.7
-"""The same for names, as a share of the way from the first condition to the last."""
+_BEFORE, _FOR_NAMES, _TO_NAMES = 0.1, 0.7, 0.1
+"""Room before the lines, the same for names, and where these begin in it: shares of the way from first to last."""
 
 
 def draw_slopes(comparison: Comparison, rows: Sequence[tuple[str, str]], folder: Path, name: str) -> list[Path]:
@@ -70,8 +70,8 @@ def draw_overview(comparison: Comparison, measure: str, label: str, folder: Path
         ends = [_draw_lines(axes, comparison, s, measure) for s, axes in zip(scenarios, grid, strict=True)]
         for place, (scenario, axes, own) in enumerate(zip(scenarios, grid, ends, strict=True)):
             axes.set_title(short_title(scenario, place))
-            axes.set_xlim(-0.1 * last, (1.0 + _FOR_NAMES) * last)
-            beside = (1.0 + 0.1 + 0.1) / (1.0 + 0.1 + _FOR_NAMES)
+            axes.set_xlim(-_BEFORE * last, (1.0 + _FOR_NAMES) * last)
+            beside = (_BEFORE + 1.0 + _TO_NAMES) / (_BEFORE + 1.0 + _FOR_NAMES)
             _label_lines(axes, own, list(comparison.controllers), x=beside, align="left", size=7.0)
         grid[0].set_ylabel(label)
         return save(figure, folder, name)
@@ -102,7 +102,7 @@ def _draw_lines(axes: Axes, comparison: Comparison, scenario: str, measure: str)
     """Draw a line for each controller; where they end, shape (n_controllers, 2), NaN for who has no value."""
     conditions, n = comparison.conditions, len(comparison.controllers)
     places = np.arange(len(conditions))
-    beside = _BESIDE * np.linspace(-2.0, 2.0, n) if n > 1 else np.zeros(1)
+    beside = _BESIDE * np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1)
     ends = np.full((n, 2), np.nan)
     looks = looks_of(comparison.controllers)
     for k, controller in enumerate(comparison.controllers):
