@@ -28,11 +28,12 @@ def arcs(speed: Array, yaw_rate: Array, *, steps: int) -> tuple[Array, Array]:
 
     Args:
         speed: Shape (...,) [m/s].
-        yaw_rate: The same shape [rad/s].
+        yaw_rate: A shape that broadcasts with that of the speeds; sines and cosines are taken of these alone [rad/s].
         steps: How many steps of `prediction.STEP`.
 
     Returns:
-        Places at the end of each step, shape (..., steps, 2) [m], and headings there, shape (..., steps) [rad].
+        Places at the end of each step, shape (..., steps, 2) of both broadcast [m], and headings there, shape
+        (..., steps) of the yaw rates [rad].
     """
     time = STEP * np.arange(1, steps + 1)
     heading = yaw_rate[..., None] * time
@@ -97,11 +98,16 @@ class DynamicWindow(TwistController):
         if not rows.size:
             return result
         speed, turn = self._window(observation["twist"][rows, 0])
-        place, heading = arcs(speed, turn, steps=STEPS)
+        place, heading = arcs(speed[..., None], turn, steps=STEPS)
+        # One axis of candidates from those of speeds and turns, slower to the last.
+        place = place.reshape(len(rows), -1, STEPS, 2)
+        candidates = speed.shape + turn.shape
+        speed = np.broadcast_to(speed[..., None], candidates).reshape(len(rows), -1)
+        turn, heading = (np.broadcast_to(of, candidates).reshape(len(rows), -1) for of in (turn, heading[:, _AIM]))
         contact = np.where(ahead.person, self.limits.contact_distance, self.limits.agent_contact_distance)
         free = _free_time(place, ahead.path, np.where(ahead.real, contact + self.margin, -1.0))
         to_goal = observation["goal"][rows][:, None] - place[:, :, _AIM]
-        off = wrap_angle(arctan2(to_goal[..., 1], to_goal[..., 0]) - heading[:, :, _AIM])
+        off = wrap_angle(arctan2(to_goal[..., 1], to_goal[..., 0]) - heading)
         score = (
             self.heading_weight * (1.0 - np.abs(off) / np.pi)
             + self.clearance_weight * free / (STEP * STEPS)
@@ -117,7 +123,7 @@ class DynamicWindow(TwistController):
         return result
 
     def _window(self, speed: Array) -> tuple[Array, Array]:
-        """Speeds and yaw rates that can be reached within a control step, both (n, SPEEDS * TURNS)."""
+        """Speeds that can be reached within a control step, (n, SPEEDS), and yaw rates, (TURNS,), the same for all."""
         change = ACCELERATION * self.limits.control_timestep
         low, high = np.maximum(speed - change, 0.0), np.minimum(speed + change, self.limits.max_speed)
         low = np.minimum(low, self.limits.max_speed)
@@ -125,10 +131,7 @@ class DynamicWindow(TwistController):
         speeds = low[:, None] + share * np.maximum(high - low, 0.0)[:, None]
         # Straight ahead first, so that it is taken of equals.
         turns = np.arange(TURNS // 2 + 1) / (TURNS // 2) * self.limits.max_yaw_rate
-        turns = np.stack([turns, -turns], axis=1).ravel()[1:]
-        shape = (len(speed), SPEEDS, TURNS)
-        window = np.broadcast_to(speeds[:, ::-1, None], shape), np.broadcast_to(turns, shape)
-        return window[0].reshape(len(speed), -1), window[1].reshape(len(speed), -1)
+        return speeds[:, ::-1], np.stack([turns, -turns], axis=1).ravel()[1:]
 
 
 def _free_time(place: Array, path: Array, distance: Array) -> Array:
@@ -142,12 +145,17 @@ def _free_time(place: Array, path: Array, distance: Array) -> Array:
     Returns:
         (n, c) [s]; 0 if somebody is too near at the end of the first step already.
     """
+    away = np.hypot(path[..., 0], path[..., 1])
     # Whoever is too near now may be left: until then its distance only has to grow.
-    now = np.hypot(path[:, 0, :, 0], path[:, 0, :, 1])
-    distance = np.minimum(distance, now)
+    distance = np.minimum(distance, away[:, 0])
     time = np.full(place.shape[:2], STEP * STEPS)
-    for k in reversed(range(place.shape[2])):
-        gap = place[:, :, k, None] - path[:, None, k + 1]
-        near = np.hypot(gap[..., 0], gap[..., 1]) < distance[:, None]
-        time = np.where(near.any(axis=2), STEP * k, time)
+    # Only who can be met at the end of a step is looked at: how far the farthest candidate gets, and some rounding.
+    reach = np.hypot(place[..., 0], place[..., 1]).max(axis=1)
+    agent, step, other = np.nonzero(away[:, 1:] < distance[:, None] + reach[..., None] + 1e-9)
+    if not agent.size:
+        return time
+    gap = place[agent, :, step] - path[agent, step + 1, other][:, None]
+    near = np.hypot(gap[..., 0], gap[..., 1]) < distance[agent, other][:, None]
+    first = np.flatnonzero(np.diff(agent, prepend=-1))
+    time[agent[first]] = np.minimum.reduceat(np.where(near, (STEP * step)[:, None], STEP * STEPS), first, axis=0)
     return time
