@@ -45,6 +45,8 @@ def interaction_force(
     Returns:
         Shape (n_agents, 2) [m/s^2].
     """
+    force = np.zeros(position.shape)
+    position, velocity = position[present], velocity[present]
     distance = np.hypot(position[..., 0], position[..., 1])
     towards = position / np.maximum(distance, 1e-9)[..., None]
     drive = importance * velocity + towards
@@ -56,8 +58,8 @@ def interaction_force(
     braking = exp(np.maximum(near - (n_prime * spread * angle) ** 2, -700.0))
     evading = np.sign(angle) * exp(np.maximum(near - (n * spread * angle) ** 2, -700.0))
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
-    force = strength * (evading[..., None] * left - braking[..., None] * along)
-    return np.einsum("nkd->nd", np.where(present[..., None], force, 0.0))
+    force[present] = strength * (evading[..., None] * left - braking[..., None] * along)
+    return np.einsum("nkd->nd", force)
 
 
 @dataclass(kw_only=True)

@@ -8,7 +8,7 @@ from socialnav_mj.controllers.planning.foresight import Ahead
 from socialnav_mj.controllers.planning.loops import closest, speed_gained, turn_made
 from socialnav_mj.controllers.planning.terms import Terms
 from socialnav_mj.elementary import cos, sin
-from socialnav_mj.geometry import Array, to_agent_frame
+from socialnav_mj.geometry import Array, turned_back
 
 
 class Imagination:
@@ -42,17 +42,17 @@ class Imagination:
         Returns:
             A row for each of the n agents; each sees k pedestrians and k agents at most.
         """
-        n, facing = len(self.heading), self.heading[:, None]
+        n, cosine, sine = len(self.heading), cos(self.heading), sin(self.heading)
         here, there = self._ahead.path[:, self.step], self._ahead.path[:, self.step + 1]
-        place = to_agent_frame(here - self.position[:, None], facing)
-        velocity = to_agent_frame((there - here) / self._terms.step, facing)
+        place = turned_back(here - self.position[:, None], cosine[:, None], sine[:, None])
+        velocity = turned_back((there - here) / self._terms.step, cosine[:, None], sine[:, None])
         result: dict[str, NDArray[np.generic]] = {
             "active": np.ones(n, dtype=bool),
             "person": self._person,
             "position": self.position,
             "heading": self.heading,
             "twist": np.stack([self.speed, self.yaw_rate], axis=1),
-            "goal": to_agent_frame(self.goal - self.position, self.heading),
+            "goal": turned_back(self.goal - self.position, cosine, sine),
         }
         for kind, who in (("pedestrian", self._ahead.person), ("agent", ~self._ahead.person)):
             mask = self._ahead.real & who
