@@ -217,11 +217,11 @@ class Replay:
         for i in np.flatnonzero((first < begin + rows) & (last >= begin)):
             slot, since, end = self._cast.pedestrian_slot[i], max(first[i], begin), min(last[i] + 1, begin + rows)
             times = np.arange(since * count, end * count) * self._timestep
-            track = self._recording.person(int(self._cast.pedestrian_index[i])).at(times)
+            track = self._recording.person(int(self._cast.pedestrian_index[i]))
             here, fine = slice(since - begin, end - begin), slice((since - begin) * count, (end - begin) * count)
             pedestrian[here, slot] = i
-            position[fine, slot], velocity[fine, slot] = track[:2]
-            heading[here, slot] = track[2][::count]
+            position[fine, slot], velocity[fine, slot] = moved = track.motion(times)
+            heading[here, slot] = track.heading(times[::count], moved[1][::count])
         changed = np.zeros(pedestrian.shape, dtype=bool)
         changed[1:] = pedestrian[1:] != pedestrian[:-1]
         return _Window(

@@ -45,10 +45,33 @@ class Track:
         Returns:
             Position (t, 2) [m], velocity (t, 2) [m/s], heading (t,) [rad]; see `Crowd` for the heading.
         """
+        position, velocity = self.motion(times)
+        return position, velocity, self.heading(times, velocity)
+
+    def motion(self, times: ArrayLike) -> tuple[Array, Array]:
+        """Where the person is, without the heading.
+
+        Args:
+            times: (t,) [s].
+
+        Returns:
+            Position (t, 2) [m] and velocity (t, 2) [m/s], as of `at`.
+        """
         times = np.asarray(times, dtype=float)
-        curves, people = self.recording.curves, np.full(times.shape, self.index)
-        position, velocity = curves.position_and_velocity(people, times)
-        return position, velocity, curves.heading(people, times, velocity)
+        return self.recording.curves.position_and_velocity(np.full(times.shape, self.index), times)
+
+    def heading(self, times: ArrayLike, velocity: Array) -> Array:
+        """Where the person faces.
+
+        Args:
+            times: (t,) [s].
+            velocity: What `motion` returned for them, (t, 2) [m/s].
+
+        Returns:
+            Heading (t,), as of `at` [rad].
+        """
+        times = np.asarray(times, dtype=float)
+        return self.recording.curves.heading(np.full(times.shape, self.index), times, velocity)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
