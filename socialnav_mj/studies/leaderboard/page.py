@@ -16,6 +16,10 @@ from socialnav_mj.studies.leaderboard.marks import FAIR_SUCCESS, HIGH_SUCCESS
 from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 
+_FIGURE = (
+    "Success on a logit scale (the odds double from one distance to the next), bars are its 95 % intervals; dashed: who is "
+    "on the front, dotted: recorded people."
+)
 _HOW_TO_READ = f"""\
 Every controller drove the same agents among the same people. *Rank set*: the ranks that a controller can have; all \
 rank sets of a table hold together in 95 % of studies, so that two whose sets overlap without a sure difference are \
@@ -53,7 +57,7 @@ def leaderboard_page(
         Markdown.
     """
     lines = ["# Leaderboard", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ]
-    lines += ["![fronts](figures/fronts.png)", ""]
+    lines += ["![fronts](figures/fronts.png)", "", _FIGURE, ""]
     if any(board.marks for board in boards):
         lines += ["## Marks", "", *_marks(boards), ""]
     if families:
