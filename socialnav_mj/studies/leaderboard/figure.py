@@ -28,7 +28,7 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
     """The first recording's scenarios side by side, success over both other measures; numbers name the controllers.
 
     Intervals of success are drawn in the upper row only, the human row's success is dotted, and the front is dashed.
-    Success is on a logit scale, so that .98 is as far from .96 as .5 is from .34: the odds double.
+    Success is on a logit scale: .98 is as far from .96 as .5 from .34, since the odds are halved.
 
     Args:
         boards: One for each recording; the first is drawn.
