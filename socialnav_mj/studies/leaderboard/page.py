@@ -17,8 +17,8 @@ from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 
 _FIGURE = (
-    "Success on a logit scale, on which equal distances are equal ratios of the odds; bars: its 95 % intervals; dashed: "
-    "who is on the front; dotted: recorded people."
+    "Success on a logit scale, on which equal distances are equal ratios of the odds; bars: its 95 % intervals; "
+    "dashed: who is on the front; dotted: recorded people."
 )
 _HOW_TO_READ = f"""\
 Every controller drove the same agents among the same people. *Rank set*: the ranks that a controller can have; all \
