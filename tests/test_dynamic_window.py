@@ -5,7 +5,7 @@ import pytest
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Limits
-from socialnav_mj.controllers.dynamic_window import ACCELERATION, DynamicWindow, arcs
+from socialnav_mj.controllers.dynamic_window import DynamicWindow, arcs
 from socialnav_mj.geometry import twist_of_wheel_speed
 from socialnav_mj.observation import observe
 
@@ -48,7 +48,7 @@ def test_free_way_is_driven_straight_at_full_speed():
 
 
 def test_speed_stays_within_what_the_motors_reach_in_a_step():
-    assert twist_of(speed=0.0)[0] == pytest.approx(ACCELERATION * 0.2)
+    assert twist_of(speed=0.0)[0] == pytest.approx(LIMITS.motion.acceleration * 0.2)
 
 
 def test_somebody_who_stands_ahead_is_driven_around_and_a_wall_of_people_is_braked_for():

@@ -7,7 +7,6 @@ import pytest
 from scenes import environment_of, stand, walk
 from test_controllers import LIMITS, observation, twist_of
 from test_protocol import Walks, actions
-from test_robot import World
 
 from socialnav_mj.controllers import Limits, controller_config, controller_of, make_controller
 from socialnav_mj.controllers.mpc import MPC
@@ -75,27 +74,6 @@ def test_closest_is_the_distance_of_the_origin_from_a_segment(ends, distance):
 @pytest.mark.parametrize(("gap", "cost"), [(0.23, 0.0), (0.105, 0.25), (-0.02, 1.0), (-0.27, 4.0), (-0.32, 4.0)])
 def test_lacking_clearance_is_the_square_of_the_missing_share(gap, cost):
     assert loops.lacking(0.32 + gap, 0.32, 0.23, TERMS) == pytest.approx(cost, abs=1e-12)
-
-
-@pytest.mark.parametrize("command", [(1.0, 0.0), (0.5, 1.5), (1.0, -2.618), (0.0, 2.0)])
-@pytest.mark.parametrize("begin", [(0.0, 0.0), (1.0, 0.0), (0.8, -1.5)])
-def test_roll_out_goes_where_the_physics_goes(command, begin):
-    """For 1 s, to 4 cm, .1 rad and 5 cm/s: the robot reaches any twist in half of that."""
-    world = World()
-    world.drive(0.0, 0.0, 0.5)
-    start = world.drive(*begin, 1.5)[-1]
-    end = world.drive(*command, 1.0)[-1]
-    x, y, heading, v, w = 0.0, 0.0, 0.0, start[4], start[5]
-    for _ in range(5):
-        turn, gained = loops.turn_made(command[1], w, TERMS), loops.speed_gained(command[0], v, TERMS)
-        way = (v + TERMS.mean_speed * gained) * STEP
-        x, y = x + way * np.cos(heading + 0.5 * turn), y + way * np.sin(heading + 0.5 * turn)
-        heading, v, w = heading + turn, v + gained, command[1]
-    c, s = np.cos(start[3]), np.sin(start[3])
-    dx, dy = end[1:3] - start[1:3]
-    np.testing.assert_allclose([x, y], [c * dx + s * dy, c * dy - s * dx], atol=0.04)
-    turned = (end[3] - start[3] - heading + np.pi) % (2.0 * np.pi) - np.pi
-    assert abs(turned) < 0.1 and abs(v - end[4]) < 0.05
 
 
 # What plans cost

@@ -26,10 +26,10 @@ SERVO_FORCE, SERVO_GAIN = 32.0, 80.0  # [N], [N s/m]
 class World:
     """A compiled arena with agents and pedestrians; the pedestrians wait far away until they are moved."""
 
-    def __init__(self, n_agents: int = 1, n_pedestrians: int = 0) -> None:
+    def __init__(self, n_agents: int = 1, n_pedestrians: int = 0, *, robot: str = "robot") -> None:
         """Attach copies of the models to the arena, as the scene does."""
         spec = mujoco.MjSpec.from_file(str(assets_folder() / "arena.xml"))
-        for name, prefix, count in (("robot", "agent", n_agents), ("pedestrian", "pedestrian", n_pedestrians)):
+        for name, prefix, count in ((robot, "agent", n_agents), ("pedestrian", "pedestrian", n_pedestrians)):
             for index in range(count):
                 child = mujoco.MjSpec.from_file(str(assets_folder() / f"{name}.xml"))
                 spec.attach(child, prefix=f"{prefix}_{index:03d}/", frame=spec.worldbody.add_frame())

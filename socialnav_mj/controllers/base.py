@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.config import Scenario
+from socialnav_mj.controllers.motion import LIGHT, Motion, motion_of
 from socialnav_mj.geometry import Array, twist_of_wheel_speed, wheel_speed_of_twist
 from socialnav_mj.observation import Neighbours
 
@@ -40,6 +41,8 @@ class Limits:
     """Distance between an agent's and a pedestrian's centre at which they touch [m]."""
     agent_contact_distance: float
     """Distance between two agents' centres at which they touch [m]."""
+    motion: Motion = LIGHT
+    """How the robots follow commands."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> "Limits":
@@ -59,6 +62,7 @@ class Limits:
             control_timestep=scenario.control_timestep,
             contact_distance=scenario.contact_distance,
             agent_contact_distance=2.0 * scenario.robot.radius,
+            motion=motion_of(scenario),
         )
 
     def wheel_speed(self, twist: Array) -> Array:

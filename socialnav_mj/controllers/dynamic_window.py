@@ -17,8 +17,6 @@ SPEEDS = 5
 """Forward speeds of the window."""
 TURNS = 17
 """Yaw rates of the window."""
-ACCELERATION = 2.2
-"""That the robot reaches: from 1 m/s it stops within .22 m (docs/simulation.md) [m/s^2]."""
 _AIM = 1
 """Step at whose end the heading is judged: when the robot has turned and could have stopped."""
 
@@ -97,13 +95,12 @@ class DynamicWindow(TwistController):
         ahead = self._foresight.look(observation)
         if not rows.size:
             return result
-        speed, turn = self._window(observation["twist"][rows, 0])
-        place, heading = arcs(speed[..., None], turn, steps=STEPS)
-        # One axis of candidates from those of speeds and turns, slower to the last.
-        place = place.reshape(len(rows), -1, STEPS, 2)
-        candidates = speed.shape + turn.shape
-        speed = np.broadcast_to(speed[..., None], candidates).reshape(len(rows), -1)
-        turn, heading = (np.broadcast_to(of, candidates).reshape(len(rows), -1) for of in (turn, heading[:, _AIM]))
+        speed, turn = self._speeds(observation["twist"][rows, 0]), self._turns(observation["twist"][rows, 1])
+        place, heading = arcs(speed[:, :, None], turn, steps=STEPS)
+        # One axis of candidates from those of speeds and turns.
+        place, candidates = place.reshape(len(rows), -1, STEPS, 2), (len(rows), SPEEDS, TURNS)
+        speed = np.broadcast_to(speed[:, :, None], candidates).reshape(len(rows), -1)
+        turn, heading = (np.broadcast_to(of, candidates).reshape(len(rows), -1) for of in (turn, heading[..., _AIM]))
         contact = np.where(ahead.person, self.limits.contact_distance, self.limits.agent_contact_distance)
         free = _free_time(place, ahead.path, np.where(ahead.real, contact + self.margin, -1.0))
         to_goal = observation["goal"][rows][:, None] - place[:, :, _AIM]
@@ -114,7 +111,7 @@ class DynamicWindow(TwistController):
             + self.speed_weight * speed / self.limits.max_speed
         )
         # v <= sqrt(2 a distance), the distance being what is driven until somebody is in the way (Fox et al., eq 14).
-        admissible = speed <= 2.0 * ACCELERATION * free
+        admissible = speed <= 2.0 * self.limits.motion.acceleration * free
         stuck = ~admissible.any(axis=1)
         best = np.where(stuck, free.argmax(axis=1), np.where(admissible, score, -np.inf).argmax(axis=1))
         every = np.arange(len(rows))
@@ -122,16 +119,27 @@ class DynamicWindow(TwistController):
         result[rows, 1] = turn[every, best]
         return result
 
-    def _window(self, speed: Array) -> tuple[Array, Array]:
-        """Speeds that can be reached within a control step, (n, SPEEDS), and yaw rates, (TURNS,), the same for all."""
-        change = ACCELERATION * self.limits.control_timestep
+    def _speeds(self, speed: Array) -> Array:
+        """Forward speeds that can be reached within a control step, (n, SPEEDS)."""
+        change = self.limits.motion.acceleration * self.limits.control_timestep
         low, high = np.maximum(speed - change, 0.0), np.minimum(speed + change, self.limits.max_speed)
         low = np.minimum(low, self.limits.max_speed)
         share = np.arange(SPEEDS) / (SPEEDS - 1)
-        speeds = low[:, None] + share * np.maximum(high - low, 0.0)[:, None]
-        # Straight ahead first, so that it is taken of equals.
-        turns = np.arange(TURNS // 2 + 1) / (TURNS // 2) * self.limits.max_yaw_rate
-        return speeds[:, ::-1], np.stack([turns, -turns], axis=1).ravel()[1:]
+        speeds: Array = low[:, None] + share * np.maximum(high - low, 0.0)[:, None]
+        return speeds[:, ::-1]
+
+    def _turns(self, yaw_rate: Array) -> Array:
+        """Yaw rates that can be, (1, 1, TURNS) if any can, else (n, 1, TURNS)."""
+        # Straight ahead first, or as now, so that it is taken of equals.
+        share = np.arange(TURNS // 2 + 1) / (TURNS // 2)
+        share = np.stack([share, -share], axis=1).ravel()[1:]
+        limit, reach = self.limits.max_yaw_rate, self.limits.motion.yaw_change
+        if reach >= 2.0 * limit:
+            return limit * share[None, None]
+        # The motors change the yaw rate by that much in a step of the prediction.
+        reach = reach * self.limits.control_timestep / STEP
+        turns: Array = np.clip(np.clip(yaw_rate, -limit, limit)[:, None] + reach * share, -limit, limit)
+        return turns[:, None]
 
 
 def _free_time(place: Array, path: Array, distance: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Observation
 from socialnav_mj.controllers.planning.arrays import costs_of
-from socialnav_mj.controllers.planning.loops import bearing, speed_gained, turn_made, yaw_command
+from socialnav_mj.controllers.planning.loops import bearing, speed_gained, turn_made, yaw_command, yaw_reached
 from socialnav_mj.controllers.planning.path_integral import (
     LEAST_WEIGHT,
     control_costs,
@@ -124,10 +124,11 @@ class MPPI(Planner):
             error = wrap_angle(bearing(goal[:, 1] - y, goal[:, 0] - x) - heading)
             command = yaw_command(error, terms)
             result[:, k, 0], result[:, k, 1] = terms.max_speed, command
-            turn, gained = turn_made(command, w, terms), speed_gained(terms.max_speed, v, terms)
+            reached = yaw_reached(command, w, terms)
+            turn, gained = turn_made(reached, w, terms), speed_gained(terms.max_speed, v, terms)
             way, middle = (v + terms.mean_speed * gained) * terms.step, heading + 0.5 * turn
             x, y, heading = x + way * cos(middle), y + way * sin(middle), heading + turn
-            v, w = v + gained, command
+            v, w = v + gained, reached
         return result
 
 

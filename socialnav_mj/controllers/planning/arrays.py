@@ -14,6 +14,7 @@ from socialnav_mj.controllers.planning.loops import (
     speed_gained,
     turn_made,
     yaw_command,
+    yaw_reached,
 )
 from socialnav_mj.controllers.planning.terms import Crowd, Terms
 from socialnav_mj.geometry import Array
@@ -103,8 +104,9 @@ def plan_costs(
         head_y = np.where(first, first_y, offset_x * to_y + offset_y * to_x)
         error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
         command = plans[..., 2 * k + 1] if sequence else yaw_command(error, terms)
-        half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(command, w, terms))
-        w = command
+        reached = yaw_reached(command, w, terms)
+        half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(reached, w, terms))
+        w = reached
         gained = speed_gained(plans[..., 2 * k] if sequence else np.where(first, v_1, v_2), v, terms)
         way = (v + terms.mean_speed * gained) * terms.step
         v = v + gained

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Limits, Observation
 from socialnav_mj.controllers.planning.foresight import Ahead
-from socialnav_mj.controllers.planning.loops import closest, speed_gained, turn_made
+from socialnav_mj.controllers.planning.loops import closest, speed_gained, turn_made, yaw_reached
 from socialnav_mj.controllers.planning.terms import Terms
 from socialnav_mj.elementary import cos, sin
 from socialnav_mj.geometry import Array, turned_back
@@ -71,7 +71,8 @@ class Imagination:
             Least distance to each other within the step, shape (n, k) [m].
         """
         terms = self._terms
-        turn = turn_made(twist[:, 1], self.yaw_rate, terms)
+        yaw_rate = yaw_reached(twist[:, 1], self.yaw_rate, terms)
+        turn = turn_made(yaw_rate, self.yaw_rate, terms)
         gained = speed_gained(twist[:, 0], self.speed, terms)
         way = (self.speed + terms.mean_speed * gained) * terms.step
         middle = self.heading + 0.5 * turn
@@ -79,7 +80,7 @@ class Imagination:
         before = self._ahead.path[:, self.step] - self.position[:, None]
         after = self._ahead.path[:, self.step + 1] - moved[:, None]
         self.position, self.heading = moved, self.heading + turn
-        self.speed, self.yaw_rate = self.speed + gained, twist[:, 1].copy()
+        self.speed, self.yaw_rate = self.speed + gained, yaw_rate
         self.step += 1
         distance: Array = closest(before[..., 0], before[..., 1], after[..., 0], after[..., 1])
         return distance

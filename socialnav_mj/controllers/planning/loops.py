@@ -63,14 +63,22 @@ def bearing(y: Any, x: Any) -> Any:
 
 
 def yaw_command(error: Any, terms: Terms) -> Any:
-    """Yaw rate that removes a heading error [rad] in a step, within the limit [rad/s]."""
-    return _smaller(_larger(error / terms.step, -terms.max_yaw_rate), terms.max_yaw_rate)
+    """Yaw rate that removes a heading error [rad] in a step, within the limit, and from which it can stop [rad/s]."""
+    lost = 0.5 * terms.yaw_acceleration * terms.step
+    most = _smaller(_root(lost * lost + 2.0 * terms.yaw_acceleration * abs(error)) - lost, terms.max_yaw_rate)
+    return _smaller(_larger(error / terms.step, -most), most)
 
 
-def turn_made(command: Any, yaw_rate: Any, terms: Terms) -> Any:
-    """Turn in a step: as commanded, less what is lost until the robot has that yaw rate [rad]."""
-    change = command - yaw_rate
-    return command * terms.step - change * (0.5 * abs(change) / terms.yaw_acceleration + terms.yaw_delay)
+def yaw_reached(command: Any, yaw_rate: Any, terms: Terms) -> Any:
+    """Yaw rate at the end of a step [rad/s]."""
+    nearest = _smaller(_larger(command, yaw_rate - terms.yaw_change), yaw_rate + terms.yaw_change)
+    return _either(abs(command - yaw_rate) <= terms.yaw_change, command, nearest)
+
+
+def turn_made(reached: Any, yaw_rate: Any, terms: Terms) -> Any:
+    """Turn in a step: as reached, less what is lost until the robot has that yaw rate [rad]."""
+    change = reached - yaw_rate
+    return reached * terms.step - change * (0.5 * abs(change) / terms.yaw_acceleration + terms.yaw_delay)
 
 
 def speed_gained(command: Any, speed: Any, terms: Terms) -> Any:
@@ -179,8 +187,9 @@ def loop_costs(
                 else:
                     error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
                     command = yaw_command(error, terms)
-                half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(command, w, terms))
-                w = command
+                reached = yaw_reached(command, w, terms)
+                half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(reached, w, terms))
+                w = reached
                 gained = speed_gained(commanded, v, terms)
                 way = (v + terms.mean_speed * gained) * terms.step
                 v = v + gained
@@ -263,6 +272,7 @@ def compiled() -> Callable[..., tuple[Array, Array]] | None:
         small_sine_cosine,
         bearing,
         yaw_command,
+        yaw_reached,
         turn_made,
         speed_gained,
         closest,

@@ -9,18 +9,6 @@ from socialnav_mj.controllers.prediction import STEP
 from socialnav_mj.elementary import exp
 from socialnav_mj.geometry import Array
 
-# The robot's motion in 0.2 s, fitted to assets/robot.xml; `tests/test_planning.py` holds roll-outs beside the physics.
-SPEED_RESPONSE = 0.725
-"""Share of a commanded change of speed that is made in 0.2 s [1]."""
-SPEED_CHANGE = 0.49
-"""The largest change of speed in 0.2 s [m/s]."""
-MEAN_SPEED = 0.55
-"""Share of a step's change of speed that its mean speed has [1]."""
-YAW_ACCELERATION = 29.7
-"""With which a commanded yaw rate is reached [rad/s^2]."""
-YAW_DELAY = 0.005
-"""After which it is [s]."""
-
 # The shapes of the costs: chosen on draws 0-9 of students003.
 MARGIN = 0.23
 """Clearance beyond contact that is free of cost now [m]."""
@@ -68,7 +56,7 @@ class Crowd(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """What roll-outs of one episode share; see this module's constants."""
+    """What roll-outs of one episode share; see `Limits`, `Motion` and this module's constants."""
 
     step: float
     max_speed: float
@@ -78,6 +66,7 @@ class Terms(NamedTuple):
     mean_speed: float
     yaw_acceleration: float
     yaw_delay: float
+    yaw_change: float
     margin: Array
     """(steps,) free clearance at each step [m]."""
     overlap: float
@@ -101,18 +90,20 @@ def terms_of(limits: Limits, *, steps: int) -> Terms:
         steps: How many steps of `prediction.STEP` a roll-out has.
 
     Returns:
-        With this module's constants.
+        With the robots' motion and this module's constants.
     """
+    motion = limits.motion
     ahead: Array = STEP * np.arange(steps, dtype=float)
     return Terms(
         step=STEP,
         max_speed=limits.max_speed,
         max_yaw_rate=limits.max_yaw_rate,
-        speed_response=SPEED_RESPONSE,
-        speed_change=SPEED_CHANGE,
-        mean_speed=MEAN_SPEED,
-        yaw_acceleration=YAW_ACCELERATION,
-        yaw_delay=YAW_DELAY,
+        speed_response=motion.speed_response,
+        speed_change=motion.speed_change,
+        mean_speed=motion.mean_speed,
+        yaw_acceleration=motion.yaw_acceleration,
+        yaw_delay=motion.yaw_delay,
+        yaw_change=motion.yaw_change,
         margin=MARGIN + MARGIN_GROWTH * ahead,
         overlap=OVERLAP,
         most_lacking=MOST_LACKING,
