@@ -72,7 +72,7 @@ def test_an_ideal_unicycle_does_as_it_is_told():
 @pytest.mark.parametrize("motion", [LIGHT, HEAVY, IDEAL])
 @pytest.mark.parametrize("error", [0.02, 0.4, 3.0])
 def test_a_heading_is_reached_and_hardly_passed(error, motion):
-    """By less than .1 rad or a tenth of it; a heavy base that turned as fast as the error asks for would pass it by more than 1."""
+    """By less than .1 rad or a tenth of it; a heavy base that turned as fast as it may would pass it by more than 1."""
     terms = terms_of(replace(LIMITS, motion=motion), steps=1)
     left, w, passed = error, 0.0, 0.0
     for _ in range(25):
