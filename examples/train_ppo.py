@@ -13,6 +13,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.features import feature_set
 from socialnav_mj.recordings import load_recording
@@ -32,9 +33,10 @@ class Deadline(BaseCallback):
 def train(dataset: str, seconds: float, path: Path, *, n_slots: int = 24, n_steps: int = 128) -> None:
     """Learn from the task's own reward; every slot of the crowd is one of PPO's environments."""
     torch.set_num_threads(1)
-    crowd = CrowdVecEnv(
-        [load_recording(dataset)], feature_set("continuous"), shares=[0.1], n_slots=n_slots, guide="go_straight", seed=0
+    settings = CrowdSettings(
+        recordings=[load_recording(dataset)], features=feature_set("continuous"), shares=[0.1], n_slots=n_slots
     )
+    crowd = CrowdVecEnv(settings, seed=0)
     # Empty slots give zeros, which say nothing and cost little; a learner of one's own would leave them out.
     model = PPO(
         "MlpPolicy", crowd, n_steps=n_steps, batch_size=n_slots * n_steps // 8, gamma=0.97, seed=0, device="cpu"

@@ -12,6 +12,7 @@ import numpy as np
 from socialnav_mj import suite
 from socialnav_mj.cast import cast_recording
 from socialnav_mj.config import Scenario
+from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.features import feature_set
 from socialnav_mj.recordings import Recording
 from socialnav_mj.resources import install_hint
@@ -136,11 +137,12 @@ def measure_scenes(
     except ImportError as error:
         raise RuntimeError(f"scenes for learners need the extra 'train' ({install_hint('train')}): {error}") from error
     setting = Scenario(share=suite.SHARES[scenario])
-    crowds, features, shares = [recording], feature_set(FEATURES), [setting.share]
     n_slots = _slots_needed(recording, setting)
-    with closing(ScenesVecEnv(crowds, features, n_scenes=n_scenes, shares=shares, n_slots=n_slots, seed=seed)) as many:
-        seeds = [scene_seed(seed, scene) for scene in range(n_scenes)]
-        ones = [CrowdVecEnv(crowds, features, shares=shares, n_slots=n_slots, seed=own) for own in seeds]
+    settings = CrowdSettings(
+        recordings=(recording,), features=feature_set(FEATURES), shares=(setting.share,), n_slots=n_slots
+    )
+    with closing(ScenesVecEnv(settings, n_scenes=n_scenes, seed=seed)) as many:
+        ones = [CrowdVecEnv(settings, seed=scene_seed(seed, scene)) for scene in range(n_scenes)]
         sides = (
             _Side(ones, process_time, seed),
             _Side([many], lambda: process_time() + sum(many.cpu_time()), seed),

@@ -15,6 +15,7 @@ from scenes import TINY  # noqa: E402
 from socialnav_mj import cli  # noqa: E402
 from socialnav_mj.controllers.attention import Attention, attention_folder, load_attention  # noqa: E402
 from socialnav_mj.controllers.policy_card import PolicyError  # noqa: E402
+from socialnav_mj.envs.guided import CrowdSettings  # noqa: E402
 from socialnav_mj.envs.sb3 import CrowdVecEnv  # noqa: E402
 from socialnav_mj.features import SIGHT, People, running_state  # noqa: E402
 from socialnav_mj.learning.attention import AgentsOnly, AttentionPPO, Engineered, discomfort  # noqa: E402
@@ -44,16 +45,16 @@ SMALL = AttentionConfig(
 
 
 def crowd_of(config: AttentionConfig) -> CrowdVecEnv:
-    return CrowdVecEnv(
-        [load_recording(TINY)],
-        People(),
+    settings = CrowdSettings(
+        recordings=[load_recording(TINY)],
+        features=People(),
         shares=config.shares,
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
         guide=config.guide,
-        seed=config.seed,
     )
+    return CrowdVecEnv(settings, seed=config.seed)
 
 
 def states(seed: int, n: int = 40) -> np.ndarray:

@@ -15,6 +15,7 @@ from stable_baselines3.common.callbacks import BaseCallback  # noqa: E402
 
 from socialnav_mj.config import Scenario  # noqa: E402
 from socialnav_mj.controllers.replay_irl import load_policy  # noqa: E402
+from socialnav_mj.envs.guided import CrowdSettings  # noqa: E402
 from socialnav_mj.envs.sb3 import CrowdVecEnv  # noqa: E402
 from socialnav_mj.features import feature_set  # noqa: E402
 from socialnav_mj.learning.config import TrainingConfig  # noqa: E402
@@ -50,17 +51,17 @@ def small(**changes) -> TrainingConfig:
 def model_of(config: TrainingConfig) -> ReplayIRL:
     """A fresh learner on the smallest crowd."""
     recording, features = load_recording(config.datasets[0]), feature_set(config.features)
-    env = CrowdVecEnv(
-        [recording],
-        features,
+    settings = CrowdSettings(
+        recordings=[recording],
+        features=features,
         shares=config.shares,
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
         turn_limit=config.turn_limit,
         guide=config.guide,
-        seed=config.seed,
     )
+    env = CrowdVecEnv(settings, seed=config.seed)
     experts = demonstrate(
         recording, features, Scenario(share=1.0), minimum_displacement=2.0, contact_distance=0.25, clearance=0.0
     )

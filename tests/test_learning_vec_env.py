@@ -9,6 +9,7 @@ from scenes import TINY, recording_of, stand, walk
 from stable_baselines3.common.vec_env import VecCheckNan, VecEnv, VecMonitor
 
 from socialnav_mj.cast import NOBODY
+from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.episode import Outcome
 from socialnav_mj.features import FEATURE_SETS, feature_set, running_state, view_of
@@ -19,14 +20,14 @@ SHORT = walk([(0.0, 0.0), (1.2, 0.0)], 1.0)
 
 
 def crowd(*recordings, shares=(1.0,), n_slots=4, features="continuous", seed=0, **kwargs) -> CrowdVecEnv:
-    return CrowdVecEnv(
-        recordings or (load_recording(TINY),),
-        feature_set(features),
+    settings = CrowdSettings(
+        recordings=recordings or (load_recording(TINY),),
+        features=feature_set(features),
         shares=shares,
         n_slots=n_slots,
-        seed=seed,
-        **{"robot_radius": 0.17, "pedestrian_radius": 0.15, "guide": "go_straight", **kwargs},
+        **kwargs,
     )
+    return CrowdVecEnv(settings, seed=seed)
 
 
 def to_the_goal(states):

@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
 from socialnav_mj import throughput
 from socialnav_mj.cli import main
+from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.envs.scenes import ScenesVecEnv, scene_seed
 from socialnav_mj.envs.worker import WorkerError
@@ -77,24 +78,18 @@ class Meeting(Continuous):
         return super().__call__(view)
 
 
-def settings(**changes):
-    return {"shares": (0.4, 1.0), "n_slots": SLOTS, "guide": "potential_field", **changes}
+def settings(**changes) -> CrowdSettings:
+    of_all = {"shares": (0.4, 1.0), "n_slots": SLOTS, "guide": "potential_field"}
+    of_all |= {"recordings": [load_recording(TINY)], "features": feature_set("continuous")}
+    return CrowdSettings(**{**of_all, **changes})
 
 
-def scenes(n_scenes=2, features=None, seed=3, recording=None, **changes) -> ScenesVecEnv:
-    return ScenesVecEnv(
-        [load_recording(TINY) if recording is None else recording],
-        feature_set("continuous") if features is None else features,
-        n_scenes=n_scenes,
-        seed=seed,
-        **settings(**changes),
-    )
+def scenes(n_scenes=2, seed=3, **changes) -> ScenesVecEnv:
+    return ScenesVecEnv(settings(**changes), n_scenes=n_scenes, seed=seed)
 
 
 def alone(scene, seed=3, **changes) -> CrowdVecEnv:
-    return CrowdVecEnv(
-        [load_recording(TINY)], feature_set("continuous"), seed=scene_seed(seed, scene), **settings(**changes)
-    )
+    return CrowdVecEnv(settings(**changes), seed=scene_seed(seed, scene))
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +170,7 @@ def test_every_scene_is_to_the_bit_the_crowd_of_its_seed_alone():
 
 def test_scenes_step_at_the_same_time(tmp_path):
     with closing(
-        scenes(features=Meeting(tmp_path), recording=recording_of(walk([(0.0, 0.0), (9.0, 0.0)], 1.0)))
+        scenes(features=Meeting(tmp_path), recordings=[recording_of(walk([(0.0, 0.0), (9.0, 0.0)], 1.0))])
     ) as env:
         env.reset()
         for _ in range(3):
@@ -349,12 +344,14 @@ from multiprocessing import active_children
 import numpy as np
 
 def main():
+    from socialnav_mj.envs.guided import CrowdSettings
     from socialnav_mj.envs.scenes import ScenesVecEnv
     from socialnav_mj.features import feature_set
     from socialnav_mj.recordings import load_recording
-    env = ScenesVecEnv(
-        [load_recording({str(TINY)!r})], feature_set("continuous"), n_scenes=2, shares=[1.0], n_slots=3, seed=0
+    settings = CrowdSettings(
+        recordings=[load_recording({str(TINY)!r})], features=feature_set("continuous"), shares=[1.0], n_slots=3
     )
+    env = ScenesVecEnv(settings, n_scenes=2, seed=0)
     print(*[child.pid for child in active_children()], flush=True)
     try:
         env.reset()

@@ -1,6 +1,7 @@
 """A crowd with a guide at hand, as stable-baselines3's environments see it, without a need for that library."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,49 +18,59 @@ from socialnav_mj.geometry import Array, twist_of_wheel_speed
 from socialnav_mj.recordings import Recording
 
 
+@dataclass(frozen=True, kw_only=True)
+class CrowdSettings:
+    """What scenes are drawn from, and who drives in them; the draws are the seed's."""
+
+    recordings: Sequence[Recording]
+    """Take turns."""
+    features: FeatureSet
+    """What an agent sees."""
+    shares: Sequence[float]
+    """Shares of replaced people; take turns."""
+    n_slots: int
+    """Agents at once, at most; draws that need more are passed over."""
+    robot_radius: float = Robot.radius
+    """[m]."""
+    pedestrian_radius: float = Scenario.pedestrian_radius
+    """[m]."""
+    turn_limit: TurnLimit = "per_step"
+    """Of the agents."""
+    guide: str = "go_straight"
+    """Controller that `guide_action` asks."""
+
+
 class GuidedCrowd(Crowd):
     """A crowd that a controller can be asked about; a guide may have a memory, so what it was asked is kept."""
 
     render_mode: None = None
     """Nothing is drawn."""
 
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        features: FeatureSet,
-        *,
-        shares: Sequence[float],
-        n_slots: int,
-        robot_radius: float,
-        pedestrian_radius: float,
-        turn_limit: TurnLimit,
-        guide: str,
-        seed: int,
-    ) -> None:
+    def __init__(self, settings: CrowdSettings, *, seed: int) -> None:
         """Build the first scene.
 
         Args:
-            recordings: Take turns.
-            features: What an agent sees.
-            shares: Shares of replaced people; take turns.
-            n_slots: Agents at once, at most; draws that need more are passed over.
-            robot_radius: [m].
-            pedestrian_radius: [m].
-            turn_limit: Of the agents.
-            guide: Controller that `guide_action` asks.
+            settings: Of all scenes.
             seed: Seed from which the seeds of all draws are taken.
 
         Raises:
             ValueError: If no draw has so few agents at once, or there is no such guide.
         """
-        self._guide = make_controller(guide)
+        self._guide = make_controller(settings.guide)
         scenario = Scenario(
-            robot=Robot(radius=robot_radius),
-            pedestrian_radius=pedestrian_radius,
-            turn_limit=turn_limit,
+            robot=Robot(radius=settings.robot_radius),
+            pedestrian_radius=settings.pedestrian_radius,
+            turn_limit=settings.turn_limit,
             on_collision="retire",
         )
-        super().__init__(recordings, Flat(features), scenario, shares=shares, n_slots=n_slots, seed=seed)
+        super().__init__(
+            settings.recordings,
+            Flat(settings.features),
+            scenario,
+            shares=settings.shares,
+            n_slots=settings.n_slots,
+            seed=seed,
+        )
 
     def next_scene(self) -> None:
         """Draw a scene; `begin` begins it."""

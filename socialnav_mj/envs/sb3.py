@@ -1,20 +1,17 @@
 """A crowd as a stable-baselines3 VecEnv: every slot of the scene is one environment."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from socialnav_mj.config import Robot, Scenario, TurnLimit
 from socialnav_mj.environment import Environment
 from socialnav_mj.envs.crowd import UNDER_WAY
-from socialnav_mj.envs.guided import GuidedCrowd, infos_of
+from socialnav_mj.envs.guided import CrowdSettings, GuidedCrowd, infos_of
 from socialnav_mj.envs.spaces import action_space, observation_space
-from socialnav_mj.features import FeatureSet
 from socialnav_mj.geometry import Array
-from socialnav_mj.recordings import Recording
 
 
 class PlainVecEnv(VecEnv):
@@ -57,45 +54,19 @@ class CrowdVecEnv(PlainVecEnv):
     scene begins. Rewards are the tasks' own.
     """
 
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        features: FeatureSet,
-        *,
-        shares: Sequence[float],
-        n_slots: int,
-        robot_radius: float = Robot.radius,
-        pedestrian_radius: float = Scenario.pedestrian_radius,
-        turn_limit: TurnLimit = "per_step",
-        guide: str = "go_straight",
-        seed: int,
-    ) -> None:
+    def __init__(self, settings: CrowdSettings, *, seed: int) -> None:
         """Build the first scene.
 
         Args:
-            recordings: Take turns.
-            features: What an agent sees.
-            shares: Shares of replaced people; take turns.
-            n_slots: Number of environments; draws that need more are passed over.
-            robot_radius: [m].
-            pedestrian_radius: [m].
-            turn_limit: Of the agents.
-            guide: Controller that `guide_action` asks.
+            settings: Of all scenes; every slot is an environment.
             seed: Seed from which the seeds of all draws are taken.
+
+        Raises:
+            ValueError: If no draw has so few agents at once, or there is no such guide.
         """
-        self._crowd = GuidedCrowd(
-            recordings,
-            features,
-            shares=shares,
-            n_slots=n_slots,
-            robot_radius=robot_radius,
-            pedestrian_radius=pedestrian_radius,
-            turn_limit=turn_limit,
-            guide=guide,
-            seed=seed,
-        )
-        self._actions = np.zeros((n_slots, 2))
-        super().__init__(n_slots, observation_space(self._crowd.observer), action_space())
+        self._crowd = GuidedCrowd(settings, seed=seed)
+        self._actions = np.zeros((settings.n_slots, 2))
+        super().__init__(settings.n_slots, observation_space(self._crowd.observer), action_space())
 
     @property
     def environment(self) -> Environment:

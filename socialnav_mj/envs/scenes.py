@@ -1,23 +1,20 @@
 """Many crowds behind one stable-baselines3 VecEnv: each in a worker process, observations in shared memory."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialnav_mj.config import Robot, Scenario, TurnLimit
 from socialnav_mj.envs.crowd import UNDER_WAY
-from socialnav_mj.envs.guided import GuidedCrowd, infos_of
+from socialnav_mj.envs.guided import CrowdSettings, GuidedCrowd, infos_of
 from socialnav_mj.envs.sb3 import PlainVecEnv
 from socialnav_mj.envs.spaces import action_space, observation_space
 from socialnav_mj.envs.worker import SharedSlots, command
 from socialnav_mj.envs.workers import Workers
-from socialnav_mj.features import FeatureSet
 from socialnav_mj.features.seen import Flat
 from socialnav_mj.geometry import Array
-from socialnav_mj.recordings import Recording
 
 
 def scene_seed(seed: int, scene: int) -> int:
@@ -48,32 +45,12 @@ class ScenesVecEnv(PlainVecEnv):
     command closes.
     """
 
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        features: FeatureSet,
-        *,
-        n_scenes: int,
-        shares: Sequence[float],
-        n_slots: int,
-        robot_radius: float = Robot.radius,
-        pedestrian_radius: float = Scenario.pedestrian_radius,
-        turn_limit: TurnLimit = "per_step",
-        guide: str = "go_straight",
-        seed: int,
-    ) -> None:
+    def __init__(self, settings: CrowdSettings, *, n_scenes: int, seed: int) -> None:
         """Start the workers and build their first scenes.
 
         Args:
-            recordings: Take turns, in every scene.
-            features: What an agent sees.
+            settings: Of all scenes; in every one of them recordings and shares take turns.
             n_scenes: Worker processes, each with one scene at a time; more than there are cores gain nothing.
-            shares: Shares of replaced people; take turns, in every scene.
-            n_slots: Agents at once in a scene; draws that need more are passed over.
-            robot_radius: [m].
-            pedestrian_radius: [m].
-            turn_limit: Of the agents.
-            guide: Controller that `guide_action` asks.
             seed: Seed from which `scene_seed` takes those of the scenes.
 
         Raises:
@@ -82,23 +59,12 @@ class ScenesVecEnv(PlainVecEnv):
         """
         if n_scenes < 1:
             raise ValueError(f"n_scenes = {n_scenes} is not allowed; allowed: integers >= 1")
-        space = observation_space(Flat(features))
-        shared = SharedSlots(n_scenes * n_slots, Flat(features).bounds[""][2])
-        self._slots, self.n_slots = shared.slots, n_slots
-        make = partial(
-            GuidedCrowd,
-            tuple(recordings),
-            features,
-            shares=tuple(shares),
-            n_slots=n_slots,
-            robot_radius=robot_radius,
-            pedestrian_radius=pedestrian_radius,
-            turn_limit=turn_limit,
-            guide=guide,
-        )
-        makes = [partial(make, seed=scene_seed(seed, scene)) for scene in range(n_scenes)]
-        self._workers = Workers(makes, shared, n_slots)
-        super().__init__(n_scenes * n_slots, space, action_space())
+        features, self.n_slots = Flat(settings.features), settings.n_slots
+        shared = SharedSlots(n_scenes * self.n_slots, features.bounds[""][2])
+        self._slots = shared.slots
+        makes = [partial(GuidedCrowd, settings, seed=scene_seed(seed, scene)) for scene in range(n_scenes)]
+        self._workers = Workers(makes, shared, self.n_slots)
+        super().__init__(n_scenes * self.n_slots, observation_space(features), action_space())
 
     def reset(self) -> NDArray[np.float32]:
         """Begin all scenes; a step that is under way is finished and forgotten.

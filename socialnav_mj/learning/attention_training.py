@@ -14,6 +14,7 @@ from stable_baselines3.common.logger import configure
 from torch import nn
 
 from socialnav_mj.controllers.attention import Attention
+from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.features import feature_set
 from socialnav_mj.files import write_json, write_whole, written_whole
@@ -53,18 +54,17 @@ def train_attention(
     claim(folder, {"method": ATTENTION, **config.as_dict()})
     torch.set_num_threads(1)
     recordings = [load_recording(name, data_dir=data_dir) for name in config.datasets]
-    crowd = CrowdVecEnv(
-        [window(recording, *config.train_window) for recording in recordings],
-        feature_set(config.features),
+    settings = CrowdSettings(
+        recordings=[window(recording, *config.train_window) for recording in recordings],
+        features=feature_set(config.features),
         shares=config.shares,
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
         turn_limit=config.turn_limit,
         guide=config.guide,
-        seed=config.seed,
     )
-    model = AttentionPPO(crowd, config)
+    model = AttentionPPO(CrowdVecEnv(settings, seed=config.seed), config)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
     stored = torch.load(folder / CHECKPOINT, weights_only=True) if (folder / CHECKPOINT).exists() else None
     run = _Run(config, folder, recordings, progress)

@@ -12,6 +12,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from socialnav_mj.config import Scenario
+from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.envs.sb3 import CrowdVecEnv
 from socialnav_mj.features import feature_set
 from socialnav_mj.files import write_whole, written_whole
@@ -71,17 +72,17 @@ def train(
     )
     stored = torch.load(folder / CHECKPOINT, weights_only=True) if (folder / CHECKPOINT).exists() else None
     history: list[dict[str, Any]] = [] if stored is None else stored["history"]
-    env = CrowdVecEnv(
-        training,
-        features,
+    settings = CrowdSettings(
+        recordings=training,
+        features=features,
         shares=config.shares,
         n_slots=config.n_slots,
         robot_radius=config.robot_radius,
         pedestrian_radius=config.pedestrian_radius,
         turn_limit=config.turn_limit,
         guide=config.guide,
-        seed=config.seed,
     )
+    env = CrowdVecEnv(settings, seed=config.seed)
     model = ReplayIRL(env, experts, features, config)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
     if stored is not None:
