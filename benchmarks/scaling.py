@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from socialnav_mj import suite
 from socialnav_mj.cluster import Cluster, on_cluster
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.controllers import make_controller
 from socialnav_mj.environment import build_environment
 from socialnav_mj.evaluation import Evaluation, evaluate, jobs_of
@@ -50,7 +50,7 @@ def of_an_episode(dataset: str, scenario: str, folder: Path) -> None:
     """CPU times and sizes of one episode of the potential field."""
     recording = load_recording(dataset)
     path = folder / f"{scenario}.npz"
-    setting = Scenario(share=suite.SHARES[scenario], seed=0)
+    setting = Scenario(share=SHARES[scenario], seed=0)
     build, environment = timed(lambda: build_environment(recording, setting, robots="likely"))
     run, episode = timed(lambda: rollout(environment, make_controller("potential_field"), scenario_name=scenario))
     save, _ = timed(lambda: episode.save(path))

@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 from dm_control.rl import control
 
-from socialnav_mj import suite
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.controllers import Limits, make_controller
 from socialnav_mj.environment import build_environment, make_environment
 from socialnav_mj.physics import Physics
@@ -78,7 +77,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
     """
     from socialnav_mj.trace.writer import write_trace  # rerun is slow to import and not needed elsewhere
 
-    setting = Scenario(share=suite.SHARES[scenario], seed=seed)
+    setting = Scenario(share=SHARES[scenario], seed=seed)
     environment = build_environment(recording, setting, robots="likely")
     n_used = max(state["n_used"] for state in _record_states(environment, controller))
     bare = build_environment(recording, setting, robots=n_used)

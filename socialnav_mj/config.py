@@ -12,6 +12,9 @@ Pedestrians = Literal["replay", "weak", "yielding"]
 Plant = Literal["wheels", "unicycle"]
 PedestrianBody = Literal["rigid", "compliant"]
 
+SHARES = {"scenario_1": 0.1, "scenario_2": 0.3, "scenario_3": 0.7, "scenario_4": 0.9}
+"""Share of the people who are replaced by robots (paper section IV)."""
+
 ROBOT_RADII = (0.1, 0.4)
 """Least and largest radius of a robot's bumper. A sphere whose centre is 0.10 m high has to reach down to the floor;
 a wide one tips on wheels that stand 0.12 m beside the middle: docs/metrics.md, "What the physics bears" [m]."""

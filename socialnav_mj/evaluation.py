@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import Any
 
 from socialnav_mj import suite
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.controllers import make_controller, split_label
 from socialnav_mj.environment import build_environment
 from socialnav_mj.files import check_output, clear_leftovers, finished_files, write_whole
@@ -102,7 +102,7 @@ class Job:
     @property
     def cost(self) -> float:
         """CPU time that it takes, about [s]: 2.5/4.2/7/9 s in scenarios 1 to 4, half a second for recorded people."""
-        return 0.5 if self.controller == HUMAN else 1.7 + 8.0 * suite.SHARES[self.scenario]
+        return 0.5 if self.controller == HUMAN else 1.7 + 8.0 * SHARES[self.scenario]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,7 +259,7 @@ def _recording(dataset: str, variant: str | None, data_dir: str | None, reading:
 
 
 def _scenario(evaluation: Evaluation, name: str, draw: int) -> Scenario:
-    return Scenario().changed(**{"share": suite.SHARES[name], **evaluation.task_kwargs, "seed": draw})
+    return Scenario().changed(**{"share": SHARES[name], **evaluation.task_kwargs, "seed": draw})
 
 
 def _changes(evaluation: Evaluation, folder: Path, recording: Recording, named: dict[str, Named]) -> tuple[Change, ...]:

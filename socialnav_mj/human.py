@@ -14,7 +14,8 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.contact import FORCE_COLUMNS, Contact, contact_columns
 from socialnav_mj.episode import Episode, IntArray, Outcome, Partner
 from socialnav_mj.geometry import Array, wrap_angle
-from socialnav_mj.parts import PART, Part, Parting
+from socialnav_mj.parting import Part, Parting
+from socialnav_mj.parts import PART
 from socialnav_mj.provenance import episode_metadata, state_hash
 from socialnav_mj.recorder import recorded_series
 from socialnav_mj.recordings import Recording

@@ -9,7 +9,7 @@ from socialnav_mj.cast import NOBODY
 from socialnav_mj.contact import Contact, contact_columns
 from socialnav_mj.episode import MAX_BYTES, Episode, EpisodeError, IntArray, Outcome, Partner
 from socialnav_mj.geometry import Array
-from socialnav_mj.parts import NOT_YET, Part
+from socialnav_mj.parting import NOT_YET, Part
 from socialnav_mj.recordings import Recording
 from socialnav_mj.task import CrowdTask
 

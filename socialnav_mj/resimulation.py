@@ -7,8 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from socialnav_mj import suite
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.controllers import controller_of
 from socialnav_mj.environment import build_environment
 from socialnav_mj.episode import Episode
@@ -101,7 +100,7 @@ def _part(episodes: Iterator[Episode], metadata: dict[str, Any]) -> Episode:
 
 def _scenario_name(stated: str, scenario: Scenario) -> str:
     """Name of the task with this share of agents; the stated one if there is none, or none is stated."""
-    names = (name for name, share in suite.SHARES.items() if share == scenario.share)
+    names = (name for name, share in SHARES.items() if share == scenario.share)
     return next(names, stated) if stated else stated
 
 

@@ -13,7 +13,8 @@ from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller, Limits, controller_config
 from socialnav_mj.controllers.base import neighbours_of
 from socialnav_mj.episode import Array, Episode
-from socialnav_mj.parts import PART, Parting
+from socialnav_mj.parting import Parting
+from socialnav_mj.parts import PART
 from socialnav_mj.provenance import episode_metadata
 from socialnav_mj.recorder import Recorder
 

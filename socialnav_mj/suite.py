@@ -14,13 +14,11 @@ from dm_control.rl import control
 # dm_control.utils.containers cannot be the first import of dm_control.
 from dm_control.utils import containers
 
-from socialnav_mj.config import SETTINGS
+from socialnav_mj.config import SETTINGS, SHARES
 from socialnav_mj.environment import make_environment
 
 DOMAIN = "socialnav"
 SUITE = containers.TaggedTasks()
-SHARES = {"scenario_1": 0.1, "scenario_2": 0.3, "scenario_3": 0.7, "scenario_4": 0.9}
-"""Share of the people who are replaced by robots (paper section IV)."""
 
 
 @SUITE.add("benchmarking", "no_reward_visualization")

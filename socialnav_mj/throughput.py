@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from socialnav_mj import suite
 from socialnav_mj.cast import cast_recording
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.envs.guided import CrowdSettings
 from socialnav_mj.features import feature_set
 from socialnav_mj.recordings import Recording
@@ -136,7 +135,7 @@ def measure_scenes(
         from socialnav_mj.envs.scenes import ScenesVecEnv, scene_seed
     except ImportError as error:
         raise RuntimeError(f"scenes for learners need the extra 'train' ({install_hint('train')}): {error}") from error
-    setting = Scenario(share=suite.SHARES[scenario])
+    setting = Scenario(share=SHARES[scenario])
     n_slots = _slots_needed(recording, setting)
     settings = CrowdSettings(
         recordings=(recording,), features=feature_set(FEATURES), shares=(setting.share,), n_slots=n_slots

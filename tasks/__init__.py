@@ -3,10 +3,10 @@
 Nothing of socialnav_mj imports this name, so that a file `tasks.py` in somebody's folder stands in nobody's way.
 """
 
+from socialnav_mj.config import SHARES
 from socialnav_mj.suite import (
     ALL_TASKS,
     DOMAIN,
-    SHARES,
     SUITE,
     load,
     register_with_dm_control,

@@ -13,8 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from socialnav_mj import suite
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.controllers import make_controller
 from socialnav_mj.environment import build_environment
 from socialnav_mj.recordings import load_recording
@@ -69,7 +68,7 @@ def count(scenario: str) -> dict[str, float]:
         What is counted: how many.
     """
     recording = load_recording("plaza")
-    setting = Scenario(share=suite.SHARES[scenario], seed=0)
+    setting = Scenario(share=SHARES[scenario], seed=0)
     environment = build_environment(recording, setting, time_limit=UNTIL[scenario], robots="likely")
     rollout(environment, make_controller(CONTROLLER), scenario_name=scenario)
     physics = environment.physics

@@ -17,7 +17,18 @@ PACKAGES = ("socialnav_mj", "tasks")
 # `episode` stands above the simulator although it is filled after it: it is a record of numpy arrays, and physics and
 # task share its Outcome and Partner.
 ROWS = (
-    {"resources", "elementary", "geometry", "config", "files", "cluster", "processes", "slots", "robot_files"},
+    {
+        "resources",
+        "sources",
+        "elementary",
+        "geometry",
+        "config",
+        "files",
+        "cluster",
+        "processes",
+        "slots",
+        "robot_files",
+    },
     {"recordings"},
     {"contact", "outcome", "episode_checks", "observation", "episode", "features", "provenance"},
     {
@@ -42,7 +53,7 @@ ROWS = (
     {"suite"},
     {"tasks"},
     {"controllers"},
-    {"parts", "recorder", "rollout", "human", "resumption", "evaluation"},
+    {"parting", "parts", "recorder", "rollout", "human", "resumption", "evaluation"},
     {"metrics"},
     {"trace", "film", "export"},
     {"report"},
@@ -56,7 +67,16 @@ ROWS = (
 # A study uses what all studies share, and no other study.
 STUDIES = {room for row in ROWS for room in row if room.startswith("studies.")}
 # Controllers own no simulator: most rows above are closed to them.
-CONTROLLERS_MAY_IMPORT = {"resources", "elementary", "geometry", "config", "observation", "features", "controllers"}
+CONTROLLERS_MAY_IMPORT = {
+    "resources",
+    "sources",
+    "elementary",
+    "geometry",
+    "config",
+    "observation",
+    "features",
+    "controllers",
+}
 # `socialnav_mj.load` imports the suite when it is called.
 EXCEPTIONS = {("socialnav_mj", "suite")}
 # Rooms that may use a heavy library; every other room keeps clear of it. `rollout` and the package itself name

@@ -15,7 +15,7 @@ from socialnav_mj.studies.looks import LOOKS, SHADES
 from socialnav_mj.studies.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
 from socialnav_mj.studies.paper import figures, training_curves
 from socialnav_mj.studies.paper.figures import FIGURES, draw_figures, draw_sweep
-from socialnav_mj.studies.paper.reward_map import MOTIONS, REACH, draw_reward_maps, reward_map
+from socialnav_mj.studies.paper.reward_map import MOTIONS, REACH, SHOWN, draw_reward_maps, reward_map
 from socialnav_mj.studies.paper.training_curves import draw_training_curves, training_table
 
 SEEDS = (0, 1, 2)
@@ -199,9 +199,13 @@ def test_reward_maps_are_drawn_with_titles_and_scale(shy, tmp_path):
     text = texts(paths[1])
     for label in ("walker approaching", "walker crossing", "walker receding", "training 1", "learned reward", "alone"):
         assert label in text
+    assert "mean of 2" in text
     for words in ("Learned reward of an agent at 0.8 m/s", "with nobody there", "dashed circle: 1.2 m"):
         assert words in text
     assert paths[1].stat().st_size < 1_000_000 and REACH == 3.0
+    many = texts(draw_reward_maps({f"training {k}": shy for k in range(SHOWN + 1)}, tmp_path / "many")[1])
+    assert "mean of 4" in many and f"training {SHOWN - 1}" in many and f"training {SHOWN}" not in many
+    assert "mean" not in texts(draw_reward_maps({"training 0": shy}, tmp_path / "one")[1])
 
 
 def history_card(kept):
@@ -223,7 +227,7 @@ def test_training_curves_mark_the_kept_checkpoint_and_the_table_says_where_the_t
     png, svg = draw_training_curves(cards, tmp_path)
     assert png.stat().st_size > 0
     text = " ".join(ElementTree.parse(svg).getroot().itertext())
-    assert "training 0" in text and "training 3" in text and "validation success" in text
+    assert text.count("each training") == 1 and "kept" in text and "mean of 2" in text and "validation success" in text
     without = draw_training_curves({0: history_card(-1), 3: history_card(-1)}, tmp_path / "b")[1]
     assert len(svg.read_text()) > len(without.read_text())  # the rings
     lines = training_table({**cards, 4: {"config": {}}})

@@ -1,14 +1,21 @@
 """Kept scores: the same tables as scored anew, for the same bytes and code alone."""
 
 import os
+import subprocess
+import sys
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
 
 import numpy as np
 import pytest
 from episodes import Agent, Pedestrian, Touch, build_episode, line
+from rich.console import Console
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.report import scores
 from socialnav_mj.report.results import read_results
+from socialnav_mj.report.watching import watched
 
 
 def make(controller, draw, **kwargs):
@@ -103,3 +110,45 @@ def test_old_scores_are_removed(run, kept):
     os.utime(old, (0, 0))
     scores.clear_old_scores()
     assert not old.exists() and len(files(kept)) == 3
+
+
+def test_scores_depend_on_all_that_scoring_imports_and_not_on_the_simulator():
+    """Whatever module of this package is loaded by then is one whose change scores episodes anew."""
+    script = """if True:
+        import sys
+        import socialnav_mj.report.scores
+        print(*(module.__file__ for name, module in sys.modules.items() if name.startswith("socialnav_mj.")))
+    """
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    sources, root = scores.scoring_sources(), Path(scores.__file__).parents[2]
+    assert len(loaded) > 20
+    assert {Path(file).relative_to(root).as_posix() for file in loaded} <= {*sources}
+    assert not {"socialnav_mj/physics.py", "socialnav_mj/task.py", "socialnav_mj/rollout.py"} & {*sources}
+
+
+def test_whoever_watches_is_told_how_far_the_scoring_is(run, kept):
+    told = []
+    with watched(lambda *counts: told.append(counts)):
+        read_results(run)
+        read_results(run, anew=True, n_jobs=1)
+    read_results(run)
+    assert told == 2 * [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_commands_show_how_far_the_scoring_is(is_terminal, monkeypatch):
+    """Again and again: a command may score several runs."""
+    cli_console = import_module("socialnav_mj.cli.console")  # the package has a name `console` of its own
+    shown = Console(file=StringIO(), force_terminal=is_terminal, width=80)
+    monkeypatch.setattr(cli_console, "errors", shown)
+    monkeypatch.setattr(cli_console, "_QUIET_TIME", 0.0)
+    monkeypatch.setattr(cli_console, "_PATIENCE", 0.0)
+    with cli_console.scoring() as tell:
+        for _ in range(2):
+            for count in (1, 2, 3):
+                tell(count, 3)
+    text = shown.file.getvalue()
+    if is_terminal:
+        assert text.count("3/3") >= 2 and "scoring" in text
+    else:
+        assert text.splitlines() == 2 * ["scored 1/3", "scored 2/3", "scored 3/3"]

@@ -13,7 +13,7 @@ from dm_control.rl.control import PhysicsError
 from socialnav_mj.cli.arguments import LOCAL
 from socialnav_mj.cli.board import Leaderboard, PeopleAsRobots, Plant, Reaction
 from socialnav_mj.cli.catalogue import Data, List
-from socialnav_mj.cli.console import console, errors, failures, say
+from socialnav_mj.cli.console import console, errors, failures, say, scoring
 from socialnav_mj.cli.controllers import Check
 from socialnav_mj.cli.cost import Bench, StepSize
 from socialnav_mj.cli.exports import Export
@@ -23,6 +23,7 @@ from socialnav_mj.cli.selection import FitSelector
 from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce
 from socialnav_mj.cli.view import Render, View
 from socialnav_mj.processes import stoppable
+from socialnav_mj.report.watching import watched
 
 Command = (
     Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
@@ -83,7 +84,7 @@ def main(args: list[str] | None = None) -> None:
     try:
         with stoppable():
             try:
-                with getattr(command, "where", LOCAL).used():
+                with scoring() as tell, watched(tell), getattr(command, "where", LOCAL).used():
                     command.run()
             finally:
                 console.finish()

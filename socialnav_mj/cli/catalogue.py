@@ -10,6 +10,7 @@ from rich.text import Text
 from socialnav_mj.cli.arguments import Folder, Name
 from socialnav_mj.cli.console import console, errors, say
 from socialnav_mj.cli.recordings import describe
+from socialnav_mj.config import SHARES
 from socialnav_mj.recordings import DEFAULT_READING, Reading
 
 
@@ -25,7 +26,7 @@ class List:
 
         table = Table("task", "replaced", title="tasks", title_justify="left")
         for name in suite.ALL_TASKS:
-            table.add_row(name, f"{suite.SHARES[name]:.0%}")
+            table.add_row(name, f"{SHARES[name]:.0%}")
         console.print(table)
         table = Table("controller", "settings and their defaults", title="controllers", title_justify="left")
         for name in available():

@@ -1,6 +1,7 @@
 """What the commands say: results to stdout, everything else to stderr."""
 
 import json
+from contextlib import ExitStack, contextmanager
 from datetime import timedelta
 from math import isfinite
 from time import monotonic
@@ -13,6 +14,7 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     Task,
+    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -25,10 +27,13 @@ if TYPE_CHECKING:
 
     from socialnav_mj.cli.pace import Pace
     from socialnav_mj.evaluation import Done, Job
+    from socialnav_mj.report.watching import Watcher
 
 
 _QUIET_TIME = 10.0
 """Between two lines of progress where there is no terminal for a bar [s]."""
+_PATIENCE = 1.0
+"""What takes less is not worth a bar [s]."""
 
 
 class Results(Console):
@@ -148,3 +153,29 @@ def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
                 say(f"episodes {count}/{len(jobs)}", errors)
             if done.error is not None:
                 say(f"{done.job.file_name}: {done.error}", failures if errors.quiet else progress.console, style="red")
+
+
+@contextmanager
+def scoring() -> "Iterator[Watcher]":
+    """What tells how far the scoring is: a bar where there is a terminal, else a line now and then."""
+    with ExitStack() as stack:
+        bars: list[tuple[Progress, TaskID]] = []
+        began = said = monotonic()
+
+        def tell(count: int, total: int) -> None:
+            nonlocal began, said
+            if count == 1:
+                began = said = monotonic()
+            if errors.is_terminal and not bars and monotonic() - began >= _PATIENCE:
+                progress = stack.enter_context(counted_progress())
+                bars.append((progress, progress.add_task("scoring")))
+            for progress, bar in bars:
+                progress.update(bar, completed=count, total=total)
+            if not errors.is_terminal and monotonic() - said >= _QUIET_TIME:
+                said = monotonic()
+                say(f"scored {count}/{total}", errors)
+            if count == total:
+                stack.close()
+                bars.clear()
+
+        yield tell

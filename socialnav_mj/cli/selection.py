@@ -5,6 +5,7 @@ from pathlib import Path
 
 from socialnav_mj.cli.arguments import Folder, Scenarios
 from socialnav_mj.cli.console import errors, say
+from socialnav_mj.config import SHARES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +35,6 @@ class FitSelector:
 
     def run(self) -> None:
         """Make the trials that are missing, fit, and say where the weights are."""
-        from socialnav_mj import suite
         from socialnav_mj.learning.selection import train_selector
 
         out = self.out or Path("runs") / "selector" / Path(self.dataset).stem
@@ -43,7 +43,7 @@ class FitSelector:
                 out,
                 self.candidates,
                 dataset=self.dataset,
-                shares=[suite.SHARES[f"scenario_{number}"] for number in self.scenarios],
+                shares=[SHARES[f"scenario_{number}"] for number in self.scenarios],
                 draws=self.draws,
                 data_dir=None if self.data_dir is None else str(self.data_dir),
                 progress=say,

@@ -1,15 +1,16 @@
 """What tells a controller from what it was before somebody edited it: its sources, and what it holds."""
 
-import ast
 import hashlib
 import inspect
 import json
 import sysconfig
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from socialnav_mj.sources import made_of
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """This package: its sources are told by its version."""
@@ -38,16 +39,7 @@ def sources_of(kind: type) -> dict[str, str]:
     root = path.parent
     while (root / "__init__.py").is_file():
         root = root.parent
-    found: dict[Path, str] = {}
-    waiting = [path]
-    while waiting:
-        file = waiting.pop()
-        if file in found:
-            continue
-        content = file.read_bytes()
-        found[file] = hashlib.sha256(content).hexdigest()
-        waiting += [own for own in _imports(content, file, root) if _is_beside(own, path, root)]
-    return {file.relative_to(root).as_posix(): found[file] for file in sorted(found)}
+    return made_of([path], root, lambda own: _is_beside(own, path, root))
 
 
 def files_of(settings: Mapping[str, Any]) -> dict[str, str]:
@@ -133,29 +125,6 @@ def _typed(kind: type) -> dict[str, str]:
         return {kind.__qualname__: hashlib.sha256(inspect.getsource(kind).encode()).hexdigest()}
     except (OSError, TypeError):
         return {}
-
-
-def _imports(content: bytes, file: Path, root: Path) -> Iterator[Path]:
-    """Files below a folder that a source file imports, by their names alone: nothing is imported."""
-    try:
-        tree = ast.parse(content)
-    except (SyntaxError, ValueError):  # no Python source, such as an extension
-        return
-    for node in ast.walk(tree):
-        names: list[str] = []
-        base = root
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            if node.level:
-                base = file.parents[node.level - 1]
-            source = node.module or ""
-            names = [source, *(f"{source}.{alias.name}".lstrip(".") for alias in node.names)]
-        for name in names:
-            parts = [part for part in name.split(".") if part]
-            for depth in range(1, len(parts) + 1):
-                place = base.joinpath(*parts[:depth])
-                yield from (own for own in (place.with_suffix(".py"), place / "__init__.py") if own.is_file())
 
 
 def _is_beside(file: Path, module: Path, root: Path) -> bool:

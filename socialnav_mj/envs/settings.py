@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from socialnav_mj import suite
-from socialnav_mj.config import Scenario
+from socialnav_mj.config import SHARES, Scenario
 from socialnav_mj.controllers.base import ActionKind
 from socialnav_mj.envs import SCENARIOS
 from socialnav_mj.features.seen import Kind, Observer, observer_of
@@ -66,7 +65,7 @@ class Settings:
             raise ValueError(f"action = {action!r} is not allowed; allowed: {', '.join(get_args(ActionKind))}")
         if "seed" in changes:
             raise ValueError("seed is not allowed here; allowed: reset(seed=...), or the option draw")
-        own = {"share": suite.SHARES[f"scenario_{scenario}"], "on_collision": "retire", **changes}
+        own = {"share": SHARES[f"scenario_{scenario}"], "on_collision": "retire", **changes}
         if not isinstance(dataset, Recording):
             dataset = load_recording(dataset, variant=variant, data_dir=data_dir)
         return cls(

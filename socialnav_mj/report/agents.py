@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from socialnav_mj import suite
+from socialnav_mj.config import SHARES
 from socialnav_mj.episode import Episode, EpisodeError, check_name
 from socialnav_mj.metrics.metric import Kind, Metric
 from socialnav_mj.metrics.registry import METRICS, per_agent
@@ -153,7 +153,7 @@ def check_names(metadata: dict[str, Any]) -> None:
         check_name(f"recording.{key}", recording[key])
     if metadata["draw"] != scenario["seed"]:
         raise EpisodeError(f"it calls itself draw {metadata['draw']!r}, but its scenario has seed {scenario['seed']!r}")
-    share = suite.SHARES.get(metadata["scenario_name"], scenario["share"])
+    share = SHARES.get(metadata["scenario_name"], scenario["share"])
     if share != scenario["share"]:
         raise EpisodeError(
             f"it calls itself {metadata['scenario_name']!r}, which replaces a share of {share} of the people, but its "

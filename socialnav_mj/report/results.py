@@ -19,6 +19,7 @@ from socialnav_mj.report import columns as col
 from socialnav_mj.report.agents import Source, scenario_configuration
 from socialnav_mj.report.paired import HUMAN, pair_with_humans
 from socialnav_mj.report.scores import Scores, clear_old_scores, score, score_once
+from socialnav_mj.report.watching import counted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,10 +74,11 @@ def read_results(
     if missing := sorted({*paths} - {*there}):
         raise FileNotFoundError(f"{len(missing)} of {len(paths)} episodes are not there, the first is {missing[0]}")
     if anew or metrics is not METRICS:
-        read = list(in_processes(score, [(path, metrics) for path in paths], n_jobs=n_jobs))
+        scored = in_processes(score, [(path, metrics) for path in paths], n_jobs=n_jobs)
     else:
         clear_old_scores()
-        read = list(in_processes(score_once, [(path,) for path in paths], n_jobs=n_jobs))
+        scored = in_processes(score_once, [(path,) for path in paths], n_jobs=n_jobs)
+    read = list(counted(scored, len(paths)))
     places = {name: place for place, name in enumerate(controllers)}
 
     def key(scores: Scores) -> tuple[Any, ...]:

@@ -27,10 +27,10 @@ from socialnav_mj.parts import scored_agents
 from socialnav_mj.report.agents import Source, agents_table
 from socialnav_mj.report.collisions import contacts_table
 from socialnav_mj.report.paired import HUMAN
+from socialnav_mj.sources import made_of
 
 KEPT = 60
 """Scores that nobody asked for are removed after this time [d]."""
-_SCORING = ("*.py", "metrics/*.py", "report/*.py")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -120,14 +120,21 @@ def clear_old_scores() -> None:
                 path.unlink()
 
 
+def scoring_sources() -> dict[str, str]:
+    """Digests of all of this package that scores depend on, besides the episode.
+
+    Returns:
+        Path: sha256, of this file, of all metrics and of what they import.
+    """
+    first = _PACKAGE / "__init__.py"  # imports the suite when it is called, which nothing here does
+    begin = [Path(__file__).resolve(), *(_PACKAGE / "metrics").glob("*.py")]
+    return made_of(begin, _PACKAGE.parent, lambda own: own.is_relative_to(_PACKAGE) and own != first)
+
+
 @lru_cache(maxsize=1)
 def _code() -> str:
-    """Digest of all that scores depend on, besides the episode."""
-    digest = hashlib.sha256(f"{version('numpy')} {version('pyarrow')}".encode())
-    for pattern in _SCORING:
-        for path in sorted(_PACKAGE.glob(pattern)):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
+    digested = f"{version('numpy')} {version('pyarrow')} {json.dumps(scoring_sources())}"
+    return hashlib.sha256(digested.encode()).hexdigest()
 
 
 def _packed(scores: Scores) -> bytes:

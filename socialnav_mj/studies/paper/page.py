@@ -53,7 +53,8 @@ error of the best. Training collides at wider bodies than evaluation.
 """
 _REWARD = """\
 Learned reward of an agent that drives at 0.8 m/s towards a goal 5 m ahead, with one walker (1 m/s) at each place \
-around it. The white line, and the mark on the scale, is the reward with nobody there; the dashed circle is 1.2 m.
+around it. The white line, and the mark on the scale, is the reward with nobody there; the dashed circle is 1.2 m. The \
+first row is the mean of all trainings; of the trainings the first three have a row of their own.
 """
 
 

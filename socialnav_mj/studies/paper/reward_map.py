@@ -1,6 +1,6 @@
 """Figure 7: a learned reward as a function of where, and which way, one walker walks."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,8 @@ AGENT_SPEED, WALKER_SPEED, GOAL_DISTANCE = 0.8, 1.0, 5.0
 """The agent drives ahead, its goal ahead [m/s], [m/s], [m]."""
 REACH, N_GRID = 3.0, 121
 """Half the side of the map [m], and points along it."""
+SHOWN = 3
+"""Policies that have a row of their own, the first ones."""
 
 
 def _approaching(ahead: Array) -> Array:
@@ -90,8 +92,13 @@ def _reward(policy: TrainedPolicy, position: Array, velocity: Array) -> Array:
     return policy.reward_of(running_state(policy.features(view)))
 
 
+def _mean(maps: Sequence[RewardMap]) -> RewardMap:
+    reward, alone = (np.mean([getattr(each, name) for each in maps], axis=0) for name in ("reward", "alone"))
+    return RewardMap(x=maps[0].x, y=maps[0].y, reward=reward, alone=float(alone))
+
+
 def draw_reward_maps(policies: Mapping[str, TrainedPolicy], folder: Path) -> list[Path]:
-    """Heat maps: a row for each policy, a column for each motion of the walker.
+    """Heat maps: a row for the mean of all policies and for the first ones, a column for each motion of the walker.
 
     A white line runs where a walker changes nothing; the same value is marked "alone" on the scale.
 
@@ -102,7 +109,10 @@ def draw_reward_maps(policies: Mapping[str, TrainedPolicy], folder: Path) -> lis
     Returns:
         Paths of the files.
     """
-    maps = {title: [reward_map(policy, motion) for motion in MOTIONS] for title, policy in policies.items()}
+    every = {title: [reward_map(policy, motion) for motion in MOTIONS] for title, policy in policies.items()}
+    maps = dict([*every.items()][:SHOWN])
+    if len(every) > 1:
+        maps = {f"mean of {len(every)}": [_mean(of) for of in zip(*every.values(), strict=True)]} | maps
     with style():
         figure = new_figure(1.05 + 1.95 * len(maps))
         figure.suptitle(

@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from socialnav_mj.report.markdown import head, row
 from socialnav_mj.report.style import new_figure, save, style
-from socialnav_mj.studies.looks import LINES, MARKERS, SHADES
+from socialnav_mj.studies.looks import SHADES
 
 _PANELS = (
     ("success", "validation success"),
@@ -17,7 +19,7 @@ _PARTS = (("in_sample", "in-sample"), ("validation", "validation"), ("held_out",
 
 
 def draw_training_curves(cards: Mapping[int, Mapping[str, Any]], folder: Path) -> list[Path]:
-    """A line for each training over its scene steps; a ring marks the checkpoint that was kept.
+    """A thin line for each training over its scene steps, a thick one for their mean; rings mark what was kept.
 
     Args:
         cards: Training seed: card of the policy, with a `history`.
@@ -27,23 +29,30 @@ def draw_training_curves(cards: Mapping[int, Mapping[str, Any]], folder: Path) -
         Paths of the files.
     """
     with style():
-        figure = new_figure(2.5)
+        figure = new_figure(2.3)
         for axes, (key, label) in zip(figure.subplots(1, len(_PANELS)), _PANELS, strict=True):
-            for k, (seed, card) in enumerate(cards.items()):
-                steps = [entry["scene_steps"] / 1000.0 for entry in card["history"]]
-                values = [entry[key] for entry in card["history"]]
-                look = {"color": SHADES[k % 4], "marker": MARKERS[k % 4], "linestyle": LINES[k % 4]}
-                axes.plot(steps, values, label=f"training {seed}", markersize=3.0, clip_on=False, **look)
-                kept = [(x, y) for x, y in zip(steps, values, strict=True) if x == card["scene_steps"] / 1000.0]
-                for x, y in kept:
-                    axes.plot(x, y, marker="o", markersize=9.0, fillstyle="none", color=SHADES[k % 4], clip_on=False)
+            at: dict[float, list[float]] = {}
+            thin: dict[str, Any] = {"color": SHADES[2], "linewidth": 0.7, "clip_on": False}
+            for number, card in enumerate(cards.values()):
+                first = "_" if number else ""
+                curve = {entry["scene_steps"] / 1000.0: entry[key] for entry in card["history"]}
+                for step, value in curve.items():
+                    at.setdefault(step, []).append(value)
+                axes.plot([*curve], [*curve.values()], label=f"{first}each training", **thin)
+                kept = card["scene_steps"] / 1000.0
+                if kept in curve:
+                    ring = {"marker": "o", "markersize": 6.0, "fillstyle": "none", "linestyle": "", "color": SHADES[1]}
+                    axes.plot(kept, curve[kept], clip_on=False, label=f"{first}kept", **ring)
+            steps = sorted(step for step, values in at.items() if len(values) == len(cards))
+            mean = [float(np.mean(at[step])) for step in steps]
+            axes.plot(steps, mean, color=SHADES[0], linewidth=2.0, clip_on=False, label=f"mean of {len(cards)}")
             axes.set_xlabel("thousand scene steps")
             axes.set_ylabel(label)
             # Room for the rings; what lies on an axis is drawn whole.
             axes.margins(x=0.07)
             axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
         handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
         return save(figure, folder, "figure_9_training")
 
 
