@@ -8,6 +8,7 @@ import pytest
 from agents import METHOD_VALUES, experiment_table, roster_of
 from toy_policies import write_toy
 
+from socialnav_mj.cli import main
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.report import style
 from socialnav_mj.studies.levels import LEVEL_MEASURES, LevelTable, levels
@@ -15,7 +16,15 @@ from socialnav_mj.studies.looks import LOOKS, SHADES
 from socialnav_mj.studies.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
 from socialnav_mj.studies.paper import figures, training_curves
 from socialnav_mj.studies.paper.figures import FIGURES, draw_figures, draw_sweep
-from socialnav_mj.studies.paper.reward_map import MOTIONS, REACH, SHOWN, draw_reward_maps, reward_map
+from socialnav_mj.studies.paper.reward_map import (
+    MOTIONS,
+    REACH,
+    SHOWN,
+    draw_reward_maps,
+    reward_map,
+    rows_of,
+    worth_of_company,
+)
 from socialnav_mj.studies.paper.training_curves import draw_training_curves, training_table
 
 SEEDS = (0, 1, 2)
@@ -195,7 +204,7 @@ def test_reward_map_tells_motions_apart(tmp_path):
 
 
 def test_reward_maps_are_drawn_with_titles_and_scale(shy, tmp_path):
-    paths = draw_reward_maps({"training 0": shy, "training 1": shy}, tmp_path)
+    paths = draw_reward_maps(rows_of({"training 0": shy, "training 1": shy}), tmp_path)
     text = texts(paths[1])
     for label in ("walker approaching", "walker crossing", "walker receding", "training 1", "learned reward", "alone"):
         assert label in text
@@ -203,9 +212,18 @@ def test_reward_maps_are_drawn_with_titles_and_scale(shy, tmp_path):
     for words in ("Learned reward of an agent at 0.8 m/s", "with nobody there", "dashed circle: 1.2 m"):
         assert words in text
     assert paths[1].stat().st_size < 1_000_000 and REACH == 3.0
-    many = texts(draw_reward_maps({f"training {k}": shy for k in range(SHOWN + 1)}, tmp_path / "many")[1])
+    rows = rows_of({f"training {k}": shy for k in range(SHOWN + 1)})
+    many = texts(draw_reward_maps(rows, tmp_path / "many")[1])
     assert "mean of 4" in many and f"training {SHOWN - 1}" in many and f"training {SHOWN}" not in many
-    assert "mean" not in texts(draw_reward_maps({"training 0": shy}, tmp_path / "one")[1])
+    assert "mean" not in texts(draw_reward_maps(rows_of({"training 0": shy}), tmp_path / "one", "own_name")[1])
+    assert (tmp_path / "one" / "own_name.png").is_file()
+
+
+def test_company_is_worth_the_mean_over_directions(shy):
+    """Only who is in the sector of 30 degrees ahead counts: a twelfth of the directions."""
+    for distance in (0.5, 1.0, 2.0):
+        expected = np.tanh(-np.exp(-distance / 2.0)) / 12.0
+        assert worth_of_company(shy, "approaching", distance) == pytest.approx(expected, abs=1e-9)
 
 
 def history_card(kept):
@@ -243,3 +261,25 @@ def test_training_curves_clip_no_point(tmp_path, monkeypatch):
     for axes in drawn[0].axes:
         assert all(not line.get_clip_on() for line in axes.lines)
         assert axes.get_ylim()[1] > axes.dataLim.y1 and axes.get_xlim()[1] > axes.dataLim.x1
+
+
+def test_command_draws_maps_of_titled_policies_and_tells_what_company_is_worth(shy, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    weights = str(tmp_path / "shy.safetensors")
+    main(
+        [
+            "reward-maps",
+            f"mine={weights}",
+            f"mine={weights}",
+            "students003_continuous_seed0",
+            "--out",
+            str(tmp_path / "m"),
+        ]
+    )
+    output = capsys.readouterr().out
+    expected = np.tanh(-np.exp(-np.array([0.5, 1.0, 2.0]) / 2.0)) / 12.0
+    assert " / ".join(f"{value:+.3f}" for value in expected) in output and "mine (2)" in output
+    assert "students003_continuous_seed0" in texts(tmp_path / "m" / "reward_maps.svg")
+    with pytest.raises(SystemExit):
+        main(["reward-maps", "nobody"])
+    assert "nobody" in capsys.readouterr().err

@@ -17,7 +17,7 @@ from socialnav_mj.cli.console import console, errors, failures, say, scoring
 from socialnav_mj.cli.controllers import Check
 from socialnav_mj.cli.cost import Bench, StepSize
 from socialnav_mj.cli.exports import Export
-from socialnav_mj.cli.learning import Ship, Train
+from socialnav_mj.cli.learning import RewardMaps, Ship, Train
 from socialnav_mj.cli.runs import Draws, Evaluate, Report, Verify
 from socialnav_mj.cli.selection import FitSelector
 from socialnav_mj.cli.studies import FitPrediction, Gains, LeaveOneOut, Reproduce
@@ -40,6 +40,7 @@ Command = (
     | Annotated[StepSize, tyro.conf.subcommand("step-size")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Ship, tyro.conf.subcommand("ship")]
+    | Annotated[RewardMaps, tyro.conf.subcommand("reward-maps")]
     | Annotated[FitPrediction, tyro.conf.subcommand("fit-prediction")]
     | Annotated[FitSelector, tyro.conf.subcommand("fit-selector")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]

@@ -1,20 +1,25 @@
-"""The sub-commands of learning: `train` and `ship`."""
+"""The sub-commands of learning: `train`, `ship` and `reward-maps`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from statistics import mean
 from typing import Annotated, Any
 
 import tyro
+from rich.table import Table
 
 from socialnav_mj.cli.arguments import LOCAL, Folder, Where
-from socialnav_mj.cli.console import counted_progress, say
+from socialnav_mj.cli.console import console, counted_progress, say
 from socialnav_mj.cli.settings import AttentionSettings, TrainingSettings
 from socialnav_mj.files import check_output
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
 from socialnav_mj.processes import in_processes
 from socialnav_mj.resources import install_hint
+
+_COMPANY = (0.5, 1.0, 2.0)
+"""Distances of a walker that `reward-maps` tells of [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,3 +181,42 @@ class Ship:
 
         for path in ship(self.folders, self.out or policies_folder()):
             say(f"policy: {path}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardMaps:
+    """Show what learned rewards say of one walker around an agent: a table, and maps as PNG and SVG."""
+
+    policies: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="POLICY")]
+    """Shipped policies by name, or weights by path; as TITLE=POLICY under a title, those of one title as their mean."""
+    out: Path = Path("runs/reward_maps")
+    """Folder of the figure."""
+
+    def run(self) -> None:
+        """Print what company is worth at some distances, and draw the maps."""
+        from socialnav_mj.controllers.replay_irl import load_policy
+        from socialnav_mj.studies.paper.reward_map import MOTIONS, draw_reward_maps, worth_of_company
+
+        check_output(self.out)
+        rows: dict[str, list[Any]] = {}
+        for given in self.policies:
+            title, is_titled, policy = given.partition("=")
+            rows.setdefault(title, []).append(load_policy(policy if is_titled else title))
+        heads = [f"{motion}\n{_at(_COMPANY)}" for motion in MOTIONS]
+        table = Table(
+            "reward", *heads, title="what a walker adds to the learned reward of a step, mean over directions"
+        )
+        for title, own in rows.items():
+            worth = [[mean(worth_of_company(p, motion, at) for p in own) for at in _COMPANY] for motion in MOTIONS]
+            table.add_row(f"{title} ({len(own)})" if len(own) > 1 else title, *(_signed(each) for each in worth))
+        console.print(table)
+        for path in draw_reward_maps(rows, self.out, "reward_maps"):
+            say(f"figure: {path}")
+
+
+def _at(distances: tuple[float, ...]) -> str:
+    return " / ".join(f"{distance:g}" for distance in distances) + " m"
+
+
+def _signed(values: list[float]) -> str:
+    return " / ".join(f"{value:+.3f}" for value in values)

@@ -31,7 +31,7 @@ from socialnav_mj.studies.paper.plan import (
     Experiment,
     Variant,
 )
-from socialnav_mj.studies.paper.reward_map import draw_reward_maps
+from socialnav_mj.studies.paper.reward_map import draw_reward_maps, rows_of
 from socialnav_mj.studies.paper.training_curves import draw_training_curves
 from socialnav_mj.studies.paper.variant_figure import draw_variants
 from socialnav_mj.studies.study import read_runs
@@ -132,7 +132,7 @@ def _draw(experiment: Experiment, found: _Found, folder: Path) -> None:
     trained = {seed: load_policy(policy) for seed, policy in experiment.trainings().items()}
     if all("history" in policy.card for policy in trained.values()):
         draw_training_curves({seed: policy.card for seed, policy in trained.items()}, folder)
-    draw_reward_maps({f"training {seed}": policy for seed, policy in trained.items()}, folder)
+    draw_reward_maps(rows_of({f"training {seed}": policy for seed, policy in trained.items()}), folder)
 
 
 def agents_of(experiment: Experiment, variant: Variant, results: Mapping[str, Results]) -> pa.Table:

@@ -14,12 +14,15 @@ from socialnav_mj.geometry import Array
 from socialnav_mj.metrics import INTIMATE_DISTANCE
 from socialnav_mj.report.style import new_figure, save, style
 
+FIGURE = "figure_7_learned_reward"
 AGENT_SPEED, WALKER_SPEED, GOAL_DISTANCE = 0.8, 1.0, 5.0
 """The agent drives ahead, its goal ahead [m/s], [m/s], [m]."""
 REACH, N_GRID = 3.0, 121
 """Half the side of the map [m], and points along it."""
 SHOWN = 3
-"""Policies that have a row of their own, the first ones."""
+"""Trainings that have a row of their own, the first ones."""
+_DIRECTIONS = 120
+"""In which `worth_of_company` looks."""
 
 
 def _approaching(ahead: Array) -> Array:
@@ -80,6 +83,24 @@ def reward_map(policy: TrainedPolicy, motion: str) -> RewardMap:
     return RewardMap(x=axis, y=axis, reward=reward.reshape(N_GRID, N_GRID), alone=float(alone[0]))
 
 
+def worth_of_company(policy: TrainedPolicy, motion: str, distance: float) -> float:
+    """What a walker at a distance adds to the learned reward of a step, the mean over all directions.
+
+    Args:
+        policy: Trained.
+        motion: Of `MOTIONS`.
+        distance: > 0 [m].
+
+    Returns:
+        The difference to nobody, in (-2, 2): above 0 the reward prefers company, below it solitude.
+    """
+    angle = 2.0 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+    velocity = WALKER_SPEED * MOTIONS[motion](ahead) - (AGENT_SPEED, 0.0)
+    alone = _reward(policy, np.zeros((1, 0, 2)), np.zeros((1, 0, 2)))
+    return float(np.mean(_reward(policy, distance * ahead, velocity)) - alone[0])
+
+
 def _reward(policy: TrainedPolicy, position: Array, velocity: Array) -> Array:
     n = len(position)
     view = View(
@@ -97,22 +118,33 @@ def _mean(maps: Sequence[RewardMap]) -> RewardMap:
     return RewardMap(x=maps[0].x, y=maps[0].y, reward=reward, alone=float(alone))
 
 
-def draw_reward_maps(policies: Mapping[str, TrainedPolicy], folder: Path) -> list[Path]:
-    """Heat maps: a row for the mean of all policies and for the first ones, a column for each motion of the walker.
+def rows_of(policies: Mapping[str, TrainedPolicy]) -> dict[str, list[TrainedPolicy]]:
+    """Rows of a figure of many trainings: their mean, and the first ones.
+
+    Args:
+        policies: Title: policy.
+
+    Returns:
+        Title: policies, for `draw_reward_maps`.
+    """
+    mean = {f"mean of {len(policies)}": [*policies.values()]} if len(policies) > 1 else {}
+    return mean | {title: [policies[title]] for title in [*policies][:SHOWN]}
+
+
+def draw_reward_maps(rows: Mapping[str, Sequence[TrainedPolicy]], folder: Path, name: str = FIGURE) -> list[Path]:
+    """Heat maps: a row for the mean of some policies' rewards, a column for each motion of the walker.
 
     A white line runs where a walker changes nothing; the same value is marked "alone" on the scale.
 
     Args:
-        policies: Title: policy.
+        rows: Title: policies, one or more.
         folder: Gets a PNG and an SVG.
+        name: Of both, without ending.
 
     Returns:
         Paths of the files.
     """
-    every = {title: [reward_map(policy, motion) for motion in MOTIONS] for title, policy in policies.items()}
-    maps = dict([*every.items()][:SHOWN])
-    if len(every) > 1:
-        maps = {f"mean of {len(every)}": [_mean(of) for of in zip(*every.values(), strict=True)]} | maps
+    maps = {title: [_mean([reward_map(p, motion) for p in of]) for motion in MOTIONS] for title, of in rows.items()}
     with style():
         figure = new_figure(1.05 + 1.95 * len(maps))
         figure.suptitle(
@@ -150,7 +182,7 @@ def draw_reward_maps(policies: Mapping[str, TrainedPolicy], folder: Path) -> lis
             )
         for axes in grid[-1]:
             axes.set_xlabel("to the left [m]")
-        return save(figure, folder, "figure_7_learned_reward")
+        return save(figure, folder, name)
 
 
 def _furnish(axes: Axes, motion: str) -> None:
