@@ -7,12 +7,13 @@ Cunningham et al. 2015, doi 10.1109/ICRA.2015.7139412; for robots among people M
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import IS_CONTROLLER, Limits, Observation, TwistController
-from socialnav_mj.controllers.planning.foresight import Foresight
+from socialnav_mj.controllers.planning.foresight import Ahead, Foresight
 from socialnav_mj.controllers.planning.imagination import Imagination, clipped
 from socialnav_mj.controllers.planning.loops import inside, lacking
 from socialnav_mj.controllers.planning.terms import Terms, terms_of
@@ -93,11 +94,8 @@ class MPDM(SwitchingController):
         active = observation["active"]
         rows = np.flatnonzero(active)
         ahead = self._foresight.look(observation)
-        contact = np.where(ahead.person, self.limits.contact_distance, self.limits.agent_contact_distance)
         costs = np.full((len(active), len(self.candidates)), np.nan)
-        for k, candidate in enumerate(self._imagined):
-            candidate.reset(self._limits_ahead, seed=self._seed)
-            costs[rows, k] = self._cost(candidate, Imagination(observation, rows, ahead, self._terms), contact)
+        costs[rows] = self._costs(observation, rows, ahead)
         person = np.where(active, observation["person"], -1)
         if len(self._person) == len(person):
             again = np.flatnonzero(active & (self._person == person))
@@ -116,24 +114,43 @@ class MPDM(SwitchingController):
         """
         return super().twist(observation) * observation["active"][:, None]
 
-    def _cost(self, candidate: TwistController, imagined: Imagination, contact: Array) -> Array:
-        """Of one candidate's roll-outs, shape (n,) [m]."""
-        terms = self._terms
-        real, person = imagined.real, imagined.person
+    def _costs(self, observation: Observation, rows: NDArray[np.int64], ahead: Ahead) -> Array:
+        """Of the roll-outs of every candidate, (n, candidates) [m]; all are imagined at once, one after the other."""
+        terms, count = self._terms, len(self._imagined)
+        everywhere = Ahead(
+            path=_as_often(ahead.path, count),
+            real=_as_often(ahead.real, count),
+            person=_as_often(ahead.person, count),
+            entrance=ahead.entrance,
+        )
+        imagined = Imagination(observation, _as_often(rows, count), everywhere, terms)
+        own = [slice(k * len(rows), (k + 1) * len(rows)) for k in range(count)]
+        contact = np.where(imagined.person, self.limits.contact_distance, self.limits.agent_contact_distance)
         start = np.hypot(imagined.goal[:, 0], imagined.goal[:, 1])
         worst, zone = np.zeros(len(start)), np.zeros(len(start))
         arrived = np.zeros(len(start), dtype=bool)
+        for candidate in self._imagined:
+            candidate.reset(self._limits_ahead, seed=self._seed)
         for k in range(STEPS):
-            twist = clipped(candidate.twist(imagined.observation()), self.limits)
-            distance = imagined.drive(twist)
-            lack = np.where(real, lacking(distance, contact, terms.margin[k], terms), 0.0)
-            near = np.where(real & person, inside(distance, terms), 0.0)
+            seen = imagined.observation()
+            twists = [
+                candidate.twist({key: values[part] for key, values in seen.items()})
+                for candidate, part in zip(self._imagined, own, strict=True)
+            ]
+            distance = imagined.drive(clipped(np.concatenate(twists), self.limits))
+            lack = np.where(imagined.real, lacking(distance, contact, terms.margin[k], terms), 0.0)
+            near = np.where(imagined.real & imagined.person, inside(distance, terms), 0.0)
             worst = np.where(arrived, worst, np.maximum(worst, terms.clearance_decay[k] * _greatest(lack)))
             zone = np.where(arrived, zone, zone + terms.step * _greatest(near))
             left = np.hypot(*(imagined.goal - imagined.position).T)
             arrived = arrived | (left <= terms.arrival_distance)
         left = np.where(arrived, np.minimum(left, terms.arrival_distance), left)
-        return self.clearance_weight * worst + self.zone_weight * zone - (start - left)
+        costs: Array = self.clearance_weight * worst + self.zone_weight * zone - (start - left)
+        return costs.reshape(count, len(rows)).T
+
+
+def _as_often(values: NDArray[Any], count: int) -> NDArray[Any]:
+    return np.concatenate([values] * count)
 
 
 def _greatest(values: Array) -> Array:
