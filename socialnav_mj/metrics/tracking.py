@@ -42,15 +42,15 @@ def tracking_error(episode: Episode) -> Array:
     Returns:
         Shape (n_agents,), >= 0; NaN for agents without a command [m].
     """
-    twist = commanded_twist(episode)[:-1]
+    twist, after = commanded_twist(episode)[:-1], episode.agent_position[1:]
+    position, heading = episode.agent_position[:-1], episode.agent_heading[:-1]
+    known = (
+        np.isfinite(twist[..., 0]) & np.isfinite(heading) & np.isfinite(position[..., 0]) & np.isfinite(after[..., 0])
+    )
+    there, _ = arc(position[known], heading[known], twist[known], np.full((1, 1), episode.control_timestep))
     error = np.full(episode.agent_heading.shape, np.nan)
-    time = np.full((1, 1), episode.control_timestep)
-    shape = twist.shape[:2]
-    position, heading = episode.agent_position[:-1].reshape(-1, 2), episode.agent_heading[:-1].reshape(-1)
-    there, _ = arc(np.nan_to_num(position), np.nan_to_num(heading), np.nan_to_num(twist).reshape(-1, 2), time)
-    error[:-1] = np.linalg.norm(episode.agent_position[1:] - there.reshape(*shape, 2), axis=-1)
-    commanded = np.isfinite(episode.agent_wheel_speed[..., 0])
-    return mean_over(error, commanded & np.isfinite(error))
+    error[:-1][known] = np.linalg.norm(after[known] - there[0], axis=-1)
+    return mean_over(error, np.isfinite(error))
 
 
 def unmet_share(episode: Episode) -> Array:
