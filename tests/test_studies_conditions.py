@@ -13,9 +13,9 @@ from socialnav_mj.recordings import load_recording
 from socialnav_mj.report import style
 from socialnav_mj.studies.conditions import ConditionStudy
 from socialnav_mj.studies.kendall import kendall, tau_b
-from socialnav_mj.studies.plant.study import PLANTS
+from socialnav_mj.studies.plant.study import PLANT
 from socialnav_mj.studies.reaction.people_as_robots import people_as_robots
-from socialnav_mj.studies.reaction.study import LEVELS
+from socialnav_mj.studies.reaction.study import REACTION
 
 TINY = str(Path(__file__).parent / "data" / "tiny" / "tiny.txt")
 
@@ -57,16 +57,16 @@ def test_kendalls_tau_is_scipys_also_with_ties():
 )
 def test_impossible_studies_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
-        ConditionStudy(**{"recordings": (TINY,), "conditions": LEVELS, **changes})
+        ConditionStudy(**{"recordings": (TINY,), "conditions": REACTION.conditions, **changes})
 
 
-@pytest.mark.parametrize("conditions", [LEVELS, PLANTS])
+@pytest.mark.parametrize("conditions", [REACTION.conditions, PLANT.conditions])
 def test_first_condition_is_the_default_setting_and_all_others_are_allowed(conditions):
     scenarios = [Scenario().changed(**condition.task_kwargs) for condition in conditions]
     assert scenarios[0] == Scenario() and len({str(s.as_dict()) for s in scenarios}) == len(conditions)
 
 
-@pytest.mark.parametrize(("name", "conditions"), [("reaction", LEVELS), ("plant", PLANTS)])
+@pytest.mark.parametrize(("name", "conditions"), [("reaction", REACTION.conditions), ("plant", PLANT.conditions)])
 def test_command_runs_resumes_and_publishes_no_episode(name, conditions, tmp_path, capsys):
     out, public = tmp_path / "out", tmp_path / "results"
     command = [name, "--recordings", TINY, "--scenarios", "1", "4", "--draws", "3", "--jobs", "1"]

@@ -53,6 +53,7 @@ class Leaderboard:
 
     def run(self) -> None:
         """Run what is missing behind a bar, then write tables, figure and page, and copy them if asked to."""
+        from socialnav_mj.studies.files import PUBLIC
         from socialnav_mj.studies.leaderboard import study as leaderboard
         from socialnav_mj.studies.study import CONTROLLERS
 
@@ -70,7 +71,7 @@ class Leaderboard:
         run_study(
             study,
             partial(leaderboard.write_leaderboard, costs=None if self.costs is None else read_costs(self.costs)),
-            leaderboard.PUBLIC,
+            PUBLIC,
             out=self.out,
             jobs=self.jobs,
             publish_to=self.publish,
@@ -124,27 +125,31 @@ class _Conditions:
     publish: Folder = None
     """Folder that gets a copy of tables, figures and page: all that holds no recording and no episode."""
 
-    def study(self, conditions: Any) -> Any:
-        """The study that the options ask for.
+    out: Path = Path()
+    """Folder of the results."""
+
+    def run_on(self, subject: Any) -> None:
+        """Run what is missing behind a bar, then write tables, figures and page, and copy them if asked to.
 
         Args:
-            conditions: Settings that are compared, the first with all others.
-
-        Returns:
-            A `studies.conditions.ConditionStudy`.
+            subject: A `studies.condition_files.Subject`.
         """
+        from socialnav_mj.studies.condition_files import write_conditions
         from socialnav_mj.studies.conditions import ConditionStudy
+        from socialnav_mj.studies.files import PUBLIC
         from socialnav_mj.studies.study import CONTROLLERS
 
-        return ConditionStudy(
+        study = ConditionStudy(
             recordings=self.recordings,
-            conditions=conditions,
+            conditions=subject.conditions,
             controllers=(*(self.controllers or CONTROLLERS), *self.also),
             data_dir=None if self.data_dir is None else str(self.data_dir),
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             draws=self.draws,
             seed=self.seed,
         )
+        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
+        run_study(study, partial(write_conditions, subject), PUBLIC, making="tables and figures", **folders)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,11 +164,10 @@ class Reaction(_Conditions):
     """Folder of the results."""
 
     def run(self) -> None:
-        """Run what is missing behind a bar, then write tables, figures and page, and copy them if asked to."""
-        from socialnav_mj.studies.reaction.study import LEVELS, PUBLIC, write_reaction
+        """Run the study."""
+        from socialnav_mj.studies.reaction.study import REACTION
 
-        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
-        run_study(self.study(LEVELS), write_reaction, PUBLIC, making="tables and figures", **folders)
+        self.run_on(REACTION)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,11 +182,10 @@ class Plant(_Conditions):
     """Folder of the results."""
 
     def run(self) -> None:
-        """Run what is missing behind a bar, then write tables, figures and page, and copy them if asked to."""
-        from socialnav_mj.studies.plant.study import PLANTS, PUBLIC, write_plant
+        """Run the study."""
+        from socialnav_mj.studies.plant.study import PLANT
 
-        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
-        run_study(self.study(PLANTS), write_plant, PUBLIC, making="tables and figures", **folders)
+        self.run_on(PLANT)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -170,7 +170,8 @@ class Gains:
 
     def run(self) -> None:
         """Run what is missing behind a bar, then write tables, figure and page, and copy them if asked to."""
-        from socialnav_mj.studies.gains.study import PUBLIC, GainSweep, write_gain_sweep
+        from socialnav_mj.studies.files import PUBLIC
+        from socialnav_mj.studies.gains.study import GainSweep, write_gain_sweep
         from socialnav_mj.studies.paper.plan import shipped_for
 
         study = GainSweep(

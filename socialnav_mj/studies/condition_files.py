@@ -1,40 +1,44 @@
 """What a study of conditions leaves behind, whatever its conditions are."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from socialnav_mj.recordings import load_recording
-from socialnav_mj.studies.conditions import Comparison, ConditionStudy, compare
+from socialnav_mj.studies.conditions import Comparison, Condition, ConditionStudy, compare
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
 from socialnav_mj.studies.slopes import draw_overview, draw_slopes
 from socialnav_mj.studies.study import read_runs
 
 
-def write_conditions(
-    study: ConditionStudy,
-    out: Path,
-    *,
-    measures: Sequence[str],
-    ranked: Sequence[str],
-    slopes: Sequence[tuple[str, str]],
-    figure: str,
-    page: Callable[..., str],
-    tables: Mapping[str, Callable[[Sequence[Comparison]], Sequence[Mapping[str, Any]]]],
-    command: str,
-    n_jobs: int,
-) -> Path:
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """What a study of conditions is about, and how it is told."""
+
+    conditions: tuple[Condition, ...]
+    """The first is what the others are compared with."""
+    measures: Sequence[str]
+    """What is told of every controller and condition."""
+    ranked: Sequence[str]
+    """Of these, by which the ranking of controllers is compared."""
+    slopes: Sequence[tuple[str, str]]
+    """Measure and label of each row of the figures; the overview has the first."""
+    figure: str
+    """Beginning of the figures' names, before the recording's."""
+    page: Callable[..., str]
+    """Text of README.md, of the comparisons and `provenance`."""
+    tables: Mapping[str, Callable[[Sequence[Comparison]], Sequence[Mapping[str, Any]]]] = field(default_factory=dict)
+    """Name of a table beside those of all studies: its rows."""
+
+
+def write_conditions(subject: Subject, study: ConditionStudy, out: Path, *, command: str, n_jobs: int = -1) -> Path:
     """Make everything in the study's folder again, except its episodes.
 
     Args:
-        study: That was run by `study.reproduce`.
+        subject: What it is about.
+        study: That was run by `study.reproduce`; its conditions are the subject's.
         out: Its folder; gets tables/, figures/, README.md, report.html and provenance.json.
-        measures: What is told of every controller and condition.
-        ranked: Of these, by which the ranking of controllers is compared.
-        slopes: Measure and label of each row of the figures; the overview has the first.
-        figure: Beginning of the figures' names, before the recording's.
-        page: Text of README.md, of the comparisons and `provenance`.
-        tables: Name of a table beside those of all studies: its rows.
         command: That made it.
         n_jobs: Processes that score episodes.
 
@@ -46,15 +50,15 @@ def write_conditions(
         EpisodeError: If an episode is damaged or does not fit the others.
     """
     results = read_runs(study, out, n_jobs=n_jobs)
-    found = [compare(study, results, recording, measures, ranked) for recording in study.recordings]
+    found = [compare(study, results, recording, subject.measures, subject.ranked) for recording in study.recordings]
     write_csv(out / "tables" / "levels.csv", [row for own in found for row in own.level_rows()])
     write_csv(out / "tables" / "differences.csv", [row for own in found for row in own.difference_rows()])
     write_csv(out / "tables" / "ranking.csv", [row for own in found for row in own.tau_rows()])
-    for name, rows in tables.items():
+    for name, rows in subject.tables.items():
         write_csv(out / "tables" / f"{name}.csv", rows(found))
     for own in found:
-        draw_overview(own, *slopes[0], out / "figures", f"overview_{own.recording}")
-        draw_slopes(own, slopes, out / "figures", f"{figure}_{own.recording}")
+        draw_overview(own, *subject.slopes[0], out / "figures", f"overview_{own.recording}")
+        draw_slopes(own, subject.slopes, out / "figures", f"{subject.figure}_{own.recording}")
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     provenance = write_provenance(study, results, recordings, out, command=command)
-    return write_pages(out, page(found, provenance=provenance), results, command=command)
+    return write_pages(out, subject.page(found, provenance=provenance), results, command=command)

@@ -20,6 +20,9 @@ from socialnav_mj.report.results import Results
 from socialnav_mj.studies.levels import Level
 from socialnav_mj.studies.study import Study, run_folder
 
+PUBLIC = ("README.md", "provenance.json", "tables", "figures")
+"""What of most studies may travel with the project: no recordings, no episodes."""
+
 
 def write_pages(out: Path, text: str, results: Mapping[str, Results], *, command: str) -> Path:
     """Write a study's page, README.md to be kept with the project and report.html to be looked at.

@@ -30,8 +30,6 @@ RANGES = {
     "influence_distance": (1.0, 4.0),
 }
 """Gain: least and greatest value, the default in the geometric middle; k_p, k_v, eta, rho_0 [m]."""
-PUBLIC = ("README.md", "provenance.json", "tables", "figures")
-"""What may travel with the project: no recordings, no episodes."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,9 +19,6 @@ from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 from socialnav_mj.studies.study import CONTROLLERS, Run, Study, read_runs
 
-PUBLIC = ("README.md", "provenance.json", "tables", "figures")
-"""What may travel with the project: no recordings, no episodes."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Leaderboard(Study):
