@@ -1,5 +1,6 @@
 """Figures exist, say what they show in text, are the same for the same numbers, and survive missing ones."""
 
+import json
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
@@ -263,22 +264,14 @@ def test_training_curves_clip_no_point(tmp_path, monkeypatch):
         assert axes.get_ylim()[1] > axes.dataLim.y1 and axes.get_xlim()[1] > axes.dataLim.x1
 
 
-def test_command_draws_maps_of_titled_policies_and_tells_what_company_is_worth(shy, tmp_path, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "120")
-    weights = str(tmp_path / "shy.safetensors")
-    main(
-        [
-            "reward-maps",
-            f"mine={weights}",
-            f"mine={weights}",
-            "students003_continuous_seed0",
-            "--out",
-            str(tmp_path / "m"),
-        ]
-    )
-    output = capsys.readouterr().out
+def test_command_draws_maps_of_titled_policies_and_tells_what_company_is_worth(shy, tmp_path, capsys):
+    mine, out = f"mine={tmp_path / 'shy.safetensors'}", tmp_path / "m"
+    main(["reward-maps", mine, mine, "students003_continuous_seed0", "--out", str(out), "--json"])
+    (table,) = json.loads(capsys.readouterr().out)["tables"]
     expected = np.tanh(-np.exp(-np.array([0.5, 1.0, 2.0]) / 2.0)) / 12.0
-    assert " / ".join(f"{value:+.3f}" for value in expected) in output and "mine (2)" in output
+    assert table["rows"][0] == {"reward": "mine (2)"} | {
+        f"{motion} 0.5 / 1 / 2 m": " / ".join(f"{value:+.3f}" for value in expected) for motion in MOTIONS
+    }
     assert "students003_continuous_seed0" in texts(tmp_path / "m" / "reward_maps.svg")
     with pytest.raises(SystemExit):
         main(["reward-maps", "nobody"])

@@ -110,10 +110,11 @@ def _number(axes: Axes, board: Board, scenario: str, measure: str) -> None:
 
 
 def _points(board: Board, scenario: str, measure: str) -> tuple[Array, Array]:
-    """The measure and success of every controller, (k,) and (k,), the success as it is drawn."""
+    """The measure and success of every controller, (k,) and (k,), as they are drawn: 0 is left of all others."""
     count = len(board.controllers)
     x, success = (np.array([board.mean(scenario, k, m) for k in range(count)]) for m in (measure, "success"))
-    return x, np.clip(success, 1.0 - _MOST, _MOST)
+    least = x[x > 0.0].min(initial=np.inf)
+    return np.maximum(x, 0.5 * least if np.isfinite(least) else _TICKS[0]), np.clip(success, 1.0 - _MOST, _MOST)
 
 
 def _reach(axes: Axes, board: Board, scenario: str, measure: str) -> None:
