@@ -220,8 +220,8 @@ class Replay:
             track = self._recording.person(int(self._cast.pedestrian_index[i]))
             here, fine = slice(since - begin, end - begin), slice((since - begin) * count, (end - begin) * count)
             pedestrian[here, slot] = i
-            position[fine, slot], velocity[fine, slot] = moved = track.motion(times)
-            heading[here, slot] = track.heading(times[::count], moved[1][::count])
+            position[fine, slot], velocity[fine, slot] = track.motion(times)
+            heading[here, slot] = track.heading(times[::count], velocity[fine, slot][::count])
         changed = np.zeros(pedestrian.shape, dtype=bool)
         changed[1:] = pedestrian[1:] != pedestrian[:-1]
         return _Window(

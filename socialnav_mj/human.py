@@ -48,7 +48,7 @@ def human_episode(recording: Recording, scenario: Scenario, *, scenario_name: st
 def human_episode_in_parts(
     recording: Recording, scenario: Scenario, *, seconds: float = inf, scenario_name: str = ""
 ) -> Iterator[Episode]:
-    """The same in parts, see `socialnav_mj.parts`.
+    """The same in parts, see `socialnav_mj.parting`.
 
     Args:
         recording: As for `human_episode`.

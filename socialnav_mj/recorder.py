@@ -60,14 +60,11 @@ class Recorder:
 
     def _check_size(self) -> None:
         task, cast = self._task, self._task.cast
-        rows = len(self._samples) + 1
-        if rows * (_AGENT_BYTES * cast.n_agents + _PERSON_BYTES * len(cast.pedestrian_index)) <= MAX_BYTES:
-            return  # whoever has been there by now
         ended = (task.end_step != NOT_YET) & (task.end_step < self._first)
         n_agents = int(np.sum((task.spawn_step != NOT_YET) & ~ended))
         people = (cast.pedestrian_first_step <= task.step) & (cast.pedestrian_last_step >= self._first)
         n_people = int(np.sum(people))
-        size = rows * (_AGENT_BYTES * n_agents + _PERSON_BYTES * n_people)
+        size = (len(self._samples) + 1) * (_AGENT_BYTES * n_agents + _PERSON_BYTES * n_people)
         if size > MAX_BYTES:
             raise EpisodeError(
                 f"at {task.time:.0f} s the record of {n_agents} agents and {n_people} people takes {size} bytes; "

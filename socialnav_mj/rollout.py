@@ -63,7 +63,7 @@ def rollout_in_parts(
     Args:
         environment: As for `rollout`.
         controller: As for `rollout`.
-        seconds: Length of a part at least, see `socialnav_mj.parts`; by default there is one, without an end [s].
+        seconds: Length of a part at least, see `socialnav_mj.parting`; by default there is one, without an end [s].
         scenario_name: As for `rollout`.
         progress: As for `rollout`.
 

@@ -13,7 +13,6 @@ from socialnav_mj.controllers.dynamic_window import DynamicWindow
 from socialnav_mj.controllers.motion import HEAVY, IDEAL, LIGHT, MOTIONS
 from socialnav_mj.controllers.planning import loops
 from socialnav_mj.controllers.planning.terms import terms_of
-from socialnav_mj.controllers.prediction import STEP
 from socialnav_mj.metrics.outcomes import success
 from socialnav_mj.rollout import rollout
 from socialnav_mj.studies.settings import SETTINGS
@@ -27,11 +26,9 @@ def rolled_out(command, begin, motion, *, steps):
     terms = terms_of(replace(LIMITS, motion=motion), steps=steps)
     x, y, heading, v, w = 0.0, 0.0, 0.0, *begin
     for _ in range(steps):
-        reached = loops.yaw_reached(command[1], w, terms)
-        turn, gained = loops.turn_made(reached, w, terms), loops.speed_gained(command[0], v, terms)
-        way = (v + terms.mean_speed * gained) * STEP
+        way, turn, v, w = loops.driven(*command, v, w, terms)
         x, y = x + way * np.cos(heading + 0.5 * turn), y + way * np.sin(heading + 0.5 * turn)
-        heading, v, w = heading + turn, v + gained, reached
+        heading = heading + turn
     return x, y, heading, v, w
 
 
@@ -90,7 +87,7 @@ def test_controllers_are_told_the_motion_of_their_robots():
 
 
 def test_a_robot_of_ones_own_may_be_added(monkeypatch):
-    own = replace(HEAVY, acceleration=0.5)
+    own = HEAVY._replace(acceleration=0.5)
     monkeypatch.setitem(MOTIONS, "mine.xml", own)
     assert Limits.of(Scenario(robot=Robot(model="/somewhere/mine.xml"))).motion == own
 

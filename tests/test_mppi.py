@@ -77,7 +77,7 @@ def commanded(plans, problem):
     v = np.concatenate([np.broadcast_to(speed[:, None, None], (*plans.shape[:2], 1)), states[..., 4]], axis=2)
     gained = np.diff(v, axis=2)
     sequence = np.zeros((*plans.shape[:2], steps, 2))
-    sequence[..., 0] = v[..., :-1] + gained / terms.speed_response
+    sequence[..., 0] = v[..., :-1] + gained / terms.motion.speed_response
     sequence[..., 1] = states[..., 5]
     return np.nan_to_num(sequence), states
 

@@ -125,7 +125,7 @@ class _Conditions:
     publish: Folder = None
     """Folder that gets a copy of tables, figures and page: all that holds no recording and no episode."""
 
-    out: Path = Path()
+    out: Path
     """Folder of the results."""
 
     def run_on(self, subject: Any) -> None:
@@ -148,8 +148,15 @@ class _Conditions:
             draws=self.draws,
             seed=self.seed,
         )
-        folders: dict[str, Any] = {"out": self.out, "jobs": self.jobs, "publish_to": self.publish}
-        run_study(study, partial(write_conditions, subject), PUBLIC, making="tables and figures", **folders)
+        run_study(
+            study,
+            partial(write_conditions, subject),
+            PUBLIC,
+            out=self.out,
+            jobs=self.jobs,
+            publish_to=self.publish,
+            making="tables and figures",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

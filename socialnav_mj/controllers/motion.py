@@ -1,13 +1,12 @@
 """How a robot follows its commands, for controllers that look ahead: fitted to the physics of the shipped robots."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from socialnav_mj.config import Scenario
 
 
-@dataclass(frozen=True, kw_only=True)
-class Motion:
+class Motion(NamedTuple):
     """A robot's motion in the 0.2 s after a command; `tests/test_motion.py` holds roll-outs beside the physics."""
 
     speed_response: float

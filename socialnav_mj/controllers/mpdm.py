@@ -117,13 +117,10 @@ class MPDM(SwitchingController):
     def _costs(self, observation: Observation, rows: NDArray[np.int64], ahead: Ahead) -> Array:
         """Of the roll-outs of every candidate, (n, candidates) [m]; all are imagined at once, one after the other."""
         terms, count = self._terms, len(self._imagined)
-        everywhere = Ahead(
-            path=_as_often(ahead.path, count),
-            real=_as_often(ahead.real, count),
-            person=_as_often(ahead.person, count),
-            entrance=ahead.entrance,
+        path, real, person = (_as_often(values, count) for values in (ahead.path, ahead.real, ahead.person))
+        imagined = Imagination(
+            observation, _as_often(rows, count), ahead._replace(path=path, real=real, person=person), terms
         )
-        imagined = Imagination(observation, _as_often(rows, count), everywhere, terms)
         own = [slice(k * len(rows), (k + 1) * len(rows)) for k in range(count)]
         contact = np.where(imagined.person, self.limits.contact_distance, self.limits.agent_contact_distance)
         start = np.hypot(imagined.goal[:, 0], imagined.goal[:, 1])

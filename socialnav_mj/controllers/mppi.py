@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Observation
 from socialnav_mj.controllers.planning.arrays import costs_of
-from socialnav_mj.controllers.planning.loops import bearing, speed_gained, turn_made, yaw_command, yaw_reached
+from socialnav_mj.controllers.planning.loops import bearing, driven, yaw_command
 from socialnav_mj.controllers.planning.path_integral import (
     LEAST_WEIGHT,
     control_costs,
@@ -124,11 +124,9 @@ class MPPI(Planner):
             error = wrap_angle(bearing(goal[:, 1] - y, goal[:, 0] - x) - heading)
             command = yaw_command(error, terms)
             result[:, k, 0], result[:, k, 1] = terms.max_speed, command
-            reached = yaw_reached(command, w, terms)
-            turn, gained = turn_made(reached, w, terms), speed_gained(terms.max_speed, v, terms)
-            way, middle = (v + terms.mean_speed * gained) * terms.step, heading + 0.5 * turn
+            way, turn, v, w = driven(terms.max_speed, command, v, w, terms)
+            middle = heading + 0.5 * turn
             x, y, heading = x + way * cos(middle), y + way * sin(middle), heading + turn
-            v, w = v + gained, reached
         return result
 
 

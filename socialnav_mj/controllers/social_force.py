@@ -45,24 +45,6 @@ def interaction_force(
     Returns:
         Shape (n_agents, 2) [m/s^2].
     """
-    pushes = _pushes(
-        position, velocity, present, strength=strength, importance=importance, reach=reach, n=n, n_prime=n_prime
-    )
-    return np.einsum("nkd->nd", pushes)
-
-
-def _pushes(
-    position: Array,
-    velocity: Array,
-    present: NDArray[np.bool_],
-    *,
-    strength: float,
-    importance: float,
-    reach: float,
-    n: float,
-    n_prime: float,
-) -> Array:
-    """Force of each other, (n_agents, k, 2) [m/s^2]; arguments as of `interaction_force`."""
     force = np.zeros(position.shape)
     position, velocity = position[present], velocity[present]
     distance = np.hypot(position[..., 0], position[..., 1])
@@ -77,7 +59,7 @@ def _pushes(
     evading = np.sign(angle) * exp(np.maximum(near - (n * spread * angle) ** 2, -700.0))
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
     force[present] = strength * (evading[..., None] * left - braking[..., None] * along)
-    return force
+    return np.einsum("nkd->nd", force)
 
 
 @dataclass(kw_only=True)
@@ -121,22 +103,20 @@ class SocialForce(TwistController):
         """
         own = np.zeros((len(observation["active"]), 1, 2))
         own[:, 0, 0] = observation["twist"][:, 0]
-        position, velocity, present = (
-            np.concatenate([observation[f"pedestrian_{what}"], observation[f"agent_{what}"]], axis=1)
-            for what in ("position", "velocity", "mask")
+        people, agents = (
+            interaction_force(
+                observation[f"{kind}_position"],
+                own - observation[f"{kind}_velocity"],
+                observation[f"{kind}_mask"],
+                strength=self.strength,
+                importance=self.importance,
+                reach=self.reach,
+                n=self.n,
+                n_prime=self.n_prime,
+            )
+            for kind in ("pedestrian", "agent")
         )
-        pushes = _pushes(
-            position,
-            own - velocity,
-            present,
-            strength=self.strength,
-            importance=self.importance,
-            reach=self.reach,
-            n=self.n,
-            n_prime=self.n_prime,
-        )
-        people = observation["pedestrian_mask"].shape[1]
-        return np.einsum("nkd->nd", pushes[:, :people]) + np.einsum("nkd->nd", pushes[:, people:])
+        return people + agents
 
     def twist(self, observation: Observation) -> Array:
         """Speed and yaw rate towards the velocity at which all forces cancel.

@@ -7,14 +7,12 @@ from socialnav_mj.controllers.planning.loops import (
     bearing,
     closest,
     compiled,
+    driven,
     inside,
     lacking,
     sine_cosine,
     small_sine_cosine,
-    speed_gained,
-    turn_made,
     yaw_command,
-    yaw_reached,
 )
 from socialnav_mj.controllers.planning.terms import Crowd, Terms
 from socialnav_mj.geometry import Array
@@ -104,12 +102,9 @@ def plan_costs(
         head_y = np.where(first, first_y, offset_x * to_y + offset_y * to_x)
         error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
         command = plans[..., 2 * k + 1] if sequence else yaw_command(error, terms)
-        reached = yaw_reached(command, w, terms)
-        half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(reached, w, terms))
-        w = reached
-        gained = speed_gained(plans[..., 2 * k] if sequence else np.where(first, v_1, v_2), v, terms)
-        way = (v + terms.mean_speed * gained) * terms.step
-        v = v + gained
+        commanded = plans[..., 2 * k] if sequence else np.where(first, v_1, v_2)
+        way, turn, v, w = driven(commanded, command, v, w, terms)
+        half_sine, half_cosine = small_sine_cosine(0.5 * turn)
         cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine
         next_x, next_y = x + way * cosine, y + way * sine
         cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine

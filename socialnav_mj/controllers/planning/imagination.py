@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from socialnav_mj.controllers.base import Limits, Observation
 from socialnav_mj.controllers.planning.foresight import Ahead
-from socialnav_mj.controllers.planning.loops import closest, speed_gained, turn_made, yaw_reached
+from socialnav_mj.controllers.planning.loops import closest, driven
 from socialnav_mj.controllers.planning.terms import Terms
 from socialnav_mj.elementary import cos, sin
 from socialnav_mj.geometry import Array, turned_back
@@ -71,16 +71,13 @@ class Imagination:
             Least distance to each other within the step, shape (n, k) [m].
         """
         terms = self._terms
-        yaw_rate = yaw_reached(twist[:, 1], self.yaw_rate, terms)
-        turn = turn_made(yaw_rate, self.yaw_rate, terms)
-        gained = speed_gained(twist[:, 0], self.speed, terms)
-        way = (self.speed + terms.mean_speed * gained) * terms.step
+        way, turn, speed, yaw_rate = driven(twist[:, 0], twist[:, 1], self.speed, self.yaw_rate, terms)
         middle = self.heading + 0.5 * turn
         moved = self.position + way[:, None] * np.stack([cos(middle), sin(middle)], axis=1)
         before = self._ahead.path[:, self.step] - self.position[:, None]
         after = self._ahead.path[:, self.step + 1] - moved[:, None]
         self.position, self.heading = moved, self.heading + turn
-        self.speed, self.yaw_rate = self.speed + gained, yaw_rate
+        self.speed, self.yaw_rate = speed, yaw_rate
         self.step += 1
         distance: Array = closest(before[..., 0], before[..., 1], after[..., 0], after[..., 1])
         return distance

@@ -64,27 +64,34 @@ def bearing(y: Any, x: Any) -> Any:
 
 def yaw_command(error: Any, terms: Terms) -> Any:
     """Yaw rate that removes a heading error [rad] in a step, within the limit, and from which it can stop [rad/s]."""
-    lost = 0.5 * terms.yaw_acceleration * terms.step
-    most = _smaller(_root(lost * lost + 2.0 * terms.yaw_acceleration * abs(error)) - lost, terms.max_yaw_rate)
+    lost = 0.5 * terms.motion.yaw_acceleration * terms.step
+    most = _smaller(_root(lost * lost + 2.0 * terms.motion.yaw_acceleration * abs(error)) - lost, terms.max_yaw_rate)
     return _smaller(_larger(error / terms.step, -most), most)
 
 
 def yaw_reached(command: Any, yaw_rate: Any, terms: Terms) -> Any:
     """Yaw rate at the end of a step [rad/s]."""
-    nearest = _smaller(_larger(command, yaw_rate - terms.yaw_change), yaw_rate + terms.yaw_change)
-    return _either(abs(command - yaw_rate) <= terms.yaw_change, command, nearest)
+    nearest = _smaller(_larger(command, yaw_rate - terms.motion.yaw_change), yaw_rate + terms.motion.yaw_change)
+    return _either(abs(command - yaw_rate) <= terms.motion.yaw_change, command, nearest)
 
 
 def turn_made(reached: Any, yaw_rate: Any, terms: Terms) -> Any:
     """Turn in a step: as reached, less what is lost until the robot has that yaw rate [rad]."""
     change = reached - yaw_rate
-    return reached * terms.step - change * (0.5 * abs(change) / terms.yaw_acceleration + terms.yaw_delay)
+    return reached * terms.step - change * (0.5 * abs(change) / terms.motion.yaw_acceleration + terms.motion.yaw_delay)
 
 
 def speed_gained(command: Any, speed: Any, terms: Terms) -> Any:
     """Change of speed in a step [m/s]."""
-    change = terms.speed_response * (command - speed)
-    return _smaller(_larger(change, -terms.speed_change), terms.speed_change)
+    change = terms.motion.speed_response * (command - speed)
+    return _smaller(_larger(change, -terms.motion.speed_change), terms.motion.speed_change)
+
+
+def driven(speed_command: Any, yaw_command: Any, speed: Any, yaw_rate: Any, terms: Terms) -> tuple[Any, Any, Any, Any]:
+    """Way [m] and turn [rad] in a step, speed [m/s] and yaw rate [rad/s] at its end."""
+    reached, gained = yaw_reached(yaw_command, yaw_rate, terms), speed_gained(speed_command, speed, terms)
+    way = (speed + terms.motion.mean_speed * gained) * terms.step
+    return way, turn_made(reached, yaw_rate, terms), speed + gained, reached
 
 
 def closest(x0: Any, y0: Any, x1: Any, y1: Any) -> Any:
@@ -187,12 +194,8 @@ def loop_costs(
                 else:
                     error = bearing(cosine * head_y - sine * head_x, cosine * head_x + sine * head_y)
                     command = yaw_command(error, terms)
-                reached = yaw_reached(command, w, terms)
-                half_sine, half_cosine = small_sine_cosine(0.5 * turn_made(reached, w, terms))
-                w = reached
-                gained = speed_gained(commanded, v, terms)
-                way = (v + terms.mean_speed * gained) * terms.step
-                v = v + gained
+                way, turn, v, w = driven(commanded, command, v, w, terms)
+                half_sine, half_cosine = small_sine_cosine(0.5 * turn)
                 cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine
                 next_x, next_y = x + way * cosine, y + way * sine
                 cosine, sine = cosine * half_cosine - sine * half_sine, sine * half_cosine + cosine * half_sine
@@ -275,6 +278,7 @@ def compiled() -> Callable[..., tuple[Array, Array]] | None:
         yaw_reached,
         turn_made,
         speed_gained,
+        driven,
         closest,
         lacking,
         inside,

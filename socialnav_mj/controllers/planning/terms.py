@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from socialnav_mj.controllers.base import Limits
+from socialnav_mj.controllers.motion import Motion
 from socialnav_mj.controllers.prediction import STEP
 from socialnav_mj.elementary import exp
 from socialnav_mj.geometry import Array
@@ -61,12 +62,7 @@ class Terms(NamedTuple):
     step: float
     max_speed: float
     max_yaw_rate: float
-    speed_response: float
-    speed_change: float
-    mean_speed: float
-    yaw_acceleration: float
-    yaw_delay: float
-    yaw_change: float
+    motion: Motion
     margin: Array
     """(steps,) free clearance at each step [m]."""
     overlap: float
@@ -92,18 +88,12 @@ def terms_of(limits: Limits, *, steps: int) -> Terms:
     Returns:
         With the robots' motion and this module's constants.
     """
-    motion = limits.motion
     ahead: Array = STEP * np.arange(steps, dtype=float)
     return Terms(
         step=STEP,
         max_speed=limits.max_speed,
         max_yaw_rate=limits.max_yaw_rate,
-        speed_response=motion.speed_response,
-        speed_change=motion.speed_change,
-        mean_speed=motion.mean_speed,
-        yaw_acceleration=motion.yaw_acceleration,
-        yaw_delay=motion.yaw_delay,
-        yaw_change=motion.yaw_change,
+        motion=limits.motion,
         margin=MARGIN + MARGIN_GROWTH * ahead,
         overlap=OVERLAP,
         most_lacking=MOST_LACKING,

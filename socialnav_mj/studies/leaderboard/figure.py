@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import textalloc
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import ArrayLike
 
 from socialnav_mj.geometry import Array
 from socialnav_mj.report.paired import HUMAN
@@ -43,10 +45,9 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
         grid = figure.subplots(len(_AXES), len(board.scenarios), sharey=True, squeeze=False)
         for number, ((measure, label), row) in enumerate(zip(_AXES, grid, strict=True)):
             for place, (scenario, axes) in enumerate(zip(board.scenarios, row, strict=True)):
-                _draw(axes, board, scenario, measure)
+                _draw(axes, board, scenario, measure, with_intervals=number == 0)
                 if number == 0:
                     axes.set_title(short_title(scenario, place))
-                    _reach(axes, board, scenario, measure)
             row[0].set_xlabel(label, loc="left")
             row[0].set_ylabel("share of agents that succeed, logit scale")
         handles, labels = grid[0][0].get_legend_handles_labels()
@@ -59,7 +60,7 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
         return save(figure, folder, "fronts")
 
 
-def _draw(axes: Axes, board: Board, scenario: str, measure: str) -> None:
+def _draw(axes: Axes, board: Board, scenario: str, measure: str, *, with_intervals: bool) -> None:
     looks = looks_of(board.controllers)
     x, success = _points(board, scenario, measure)
     for k, name in enumerate(board.controllers):
@@ -73,6 +74,17 @@ def _draw(axes: Axes, board: Board, scenario: str, measure: str) -> None:
             markeredgewidth=0.4,
             label=f"{k + 1} {name}",
         )
+        level = board.table.find(scenario, name, "success")
+        if with_intervals and level is not None and np.isfinite([level.interval.low, level.interval.high]).all():
+            ends = _within([level.interval.low, level.interval.high])
+            reach: dict[str, Any] = {
+                "color": looks[name].colour,
+                "marker": "_",
+                "markersize": 3.0,
+                "linewidth": 0.9,
+                "zorder": 1,
+            }
+            axes.plot([x[k], x[k]], ends, **reach)
     front = board.front(scenario, measure)
     axes.plot(x[front], success[front], color="#999999", linewidth=0.8, linestyle=LINES[1], zorder=0)
     human = board.table.find(scenario, HUMAN, "success")
@@ -80,13 +92,11 @@ def _draw(axes: Axes, board: Board, scenario: str, measure: str) -> None:
         axes.axhline(human.interval.mean, color="black", linewidth=0.8, linestyle=":")
     axes.set_yscale("logit")
     axes.set_ylim(min(0.25, 0.9 * success.min()), 0.9982)
-    axes.yaxis.set_major_locator(FixedLocator(_SUCCESSES))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(FixedLocator(_TICKS))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_locator(NullLocator())
+    for axis, ticks in ((axes.xaxis, _TICKS), (axes.yaxis, _SUCCESSES)):
+        axis.set_major_locator(FixedLocator(ticks))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_locator(NullLocator())
     axes.grid(visible=True, axis="both")
 
 
@@ -114,15 +124,8 @@ def _points(board: Board, scenario: str, measure: str) -> tuple[Array, Array]:
     count = len(board.controllers)
     x, success = (np.array([board.mean(scenario, k, m) for k in range(count)]) for m in (measure, "success"))
     least = x[x > 0.0].min(initial=np.inf)
-    return np.maximum(x, 0.5 * least if np.isfinite(least) else _TICKS[0]), np.clip(success, 1.0 - _MOST, _MOST)
+    return np.maximum(x, 0.5 * least if np.isfinite(least) else _TICKS[0]), _within(success)
 
 
-def _reach(axes: Axes, board: Board, scenario: str, measure: str) -> None:
-    """Draw the intervals of success."""
-    looks = looks_of(board.controllers)
-    x, _ = _points(board, scenario, measure)
-    for at, name in zip(x, board.controllers, strict=True):
-        level = board.table.find(scenario, name, "success")
-        if level is not None and np.isfinite([level.interval.low, level.interval.high]).all():
-            ends = np.clip([level.interval.low, level.interval.high], 1.0 - _MOST, _MOST)
-            axes.plot([at, at], ends, color=looks[name].colour, marker="_", markersize=3.0, linewidth=0.9, zorder=1)
+def _within(success: ArrayLike) -> Array:
+    return np.clip(success, 1.0 - _MOST, _MOST)

@@ -72,15 +72,10 @@ def reward_map(policy: TrainedPolicy, motion: str) -> RewardMap:
     Raises:
         ValueError: If the motion is unknown.
     """
-    if motion not in MOTIONS:
-        raise ValueError(f"unknown motion {motion!r}; available: {', '.join(MOTIONS)}")
     axis = np.linspace(-REACH, REACH, N_GRID)
     position = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 1, 2)
-    distance = np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
-    velocity = WALKER_SPEED * MOTIONS[motion](position / distance) - (AGENT_SPEED, 0.0)
-    reward = _reward(policy, position, velocity)
-    alone = _reward(policy, np.zeros((1, 0, 2)), np.zeros((1, 0, 2)))
-    return RewardMap(x=axis, y=axis, reward=reward.reshape(N_GRID, N_GRID), alone=float(alone[0]))
+    reward = _with_a_walker(policy, motion, position)
+    return RewardMap(x=axis, y=axis, reward=reward.reshape(N_GRID, N_GRID), alone=_alone(policy))
 
 
 def worth_of_company(policy: TrainedPolicy, motion: str, distance: float) -> float:
@@ -93,12 +88,27 @@ def worth_of_company(policy: TrainedPolicy, motion: str, distance: float) -> flo
 
     Returns:
         The difference to nobody, in (-2, 2): above 0 the reward prefers company, below it solitude.
+
+    Raises:
+        ValueError: If the motion is unknown.
     """
     angle = 2.0 * np.pi * (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
     ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
-    velocity = WALKER_SPEED * MOTIONS[motion](ahead) - (AGENT_SPEED, 0.0)
-    alone = _reward(policy, np.zeros((1, 0, 2)), np.zeros((1, 0, 2)))
-    return float(np.mean(_reward(policy, distance * ahead, velocity)) - alone[0])
+    return float(np.mean(_with_a_walker(policy, motion, distance * ahead))) - _alone(policy)
+
+
+def _with_a_walker(policy: TrainedPolicy, motion: str, position: Array) -> Array:
+    """Reward with one walker at each place of (n, 1, 2), shape (n,)."""
+    if motion not in MOTIONS:
+        raise ValueError(f"unknown motion {motion!r}; available: {', '.join(MOTIONS)}")
+    distance = np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
+    velocity = WALKER_SPEED * MOTIONS[motion](position / distance) - (AGENT_SPEED, 0.0)
+    return _reward(policy, position, velocity)
+
+
+def _alone(policy: TrainedPolicy) -> float:
+    """Reward with nobody there."""
+    return float(_reward(policy, np.zeros((1, 0, 2)), np.zeros((1, 0, 2)))[0])
 
 
 def _reward(policy: TrainedPolicy, position: Array, velocity: Array) -> Array:
