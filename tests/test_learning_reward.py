@@ -158,27 +158,37 @@ def test_gradient_of_the_whole_loss_is_that_of_finite_differences():
     assert torch.autograd.gradcheck(loss, parameters, atol=1e-7)
 
 
-def test_gradient_penalty_is_the_slope_of_a_linear_reward():
-    """Of r = 3 x - 4 y: 25 everywhere, wherever the mixture is; it acts on the weights, not on the states."""
-    linear = torch.nn.Linear(2, 1)
-    with torch.no_grad():
-        linear.weight.copy_(torch.tensor([[3.0, -4.0]]))
-    expert, policy = torch.randn(8, 2), torch.randn(8, 2)
-    penalty = gradient_penalty(linear, expert, policy, torch.rand(8, 1))
-    assert float(penalty.detach()) == pytest.approx(25.0)
-    penalty.backward()
-    torch.testing.assert_close(linear.weight.grad, torch.tensor([[6.0, -8.0]]))
+@pytest.mark.parametrize("spectral", [False, True])
+@pytest.mark.parametrize("hidden", [(), (5,), (6, 5)], ids=str)
+def test_written_gradient_is_that_of_automatic_differentiation(hidden, spectral):
+    """By the state, and the penalty's by the weights."""
+    torch.manual_seed(1)
+    net = RewardNet(N_STATES, hidden, spectral=spectral).double().eval()  # spectral norms stand still in evaluation
+    expert, policy, mix = (
+        torch.randn(9, N_STATES).double(),
+        torch.randn(9, N_STATES).double(),
+        torch.rand(9, 1).double(),
+    )
+    between = (mix * expert + (1.0 - mix) * policy).requires_grad_(True)
+    (expected,) = torch.autograd.grad(net(between).sum(), between, create_graph=True)
+    torch.testing.assert_close(net.gradient(between), expected)
+    penalty = gradient_penalty(net, expert, policy, mix)
+    torch.testing.assert_close(penalty, (expected**2).sum(dim=-1).mean())
+    weights = [p for p in net.parameters() if p.dim() > 1]
+    found = torch.autograd.grad(penalty, weights)
+    for one, other in zip(found, torch.autograd.grad((expected**2).sum(dim=-1).mean(), weights), strict=True):
+        torch.testing.assert_close(one, other)
+        assert (one != 0.0).any()
 
 
 def test_gradient_penalty_looks_between_expert_and_policy():
-    """Of r = x^2 the slope at 0.25 * 4 + 0.75 * 0 is 2."""
-
-    class Square(torch.nn.Module):
-        def forward(self, state):
-            return (state**2).squeeze(-1)
-
-    penalty = gradient_penalty(Square(), torch.tensor([[4.0]]), torch.tensor([[0.0]]), torch.tensor([[0.25]]))
-    assert float(penalty.detach()) == pytest.approx(4.0)
+    """Of r = tanh(x) the slope at 0.25 * 4 + 0.75 * 0 is 1 - tanh(1)^2."""
+    net = RewardNet(1, ())
+    with torch.no_grad():
+        net.layers[0].weight.fill_(1.0)
+        net.layers[0].bias.zero_()
+    penalty = gradient_penalty(net, torch.tensor([[4.0]]), torch.tensor([[0.0]]), torch.tensor([[0.25]]))
+    assert float(penalty.detach()) == pytest.approx((1.0 - np.tanh(1.0) ** 2) ** 2)
 
 
 # What the loss learns

@@ -56,7 +56,7 @@ def test_gradients_are_those_of_automatic_differentiation(log_std, monkeypatch):
     torch.manual_seed(2)
     update = SacUpdate(ours)
     for batch in batches(40):
-        update(batch)
+        update(batch, 0.01)
     expected, found = theirs.policy.state_dict(), ours.policy.state_dict()
     assert all((a != b).any() for a, b in zip(before, found.values(), strict=True) if a.dim() > 1)
     for name in expected:
@@ -71,7 +71,7 @@ def test_losses_are_the_librarys(monkeypatch):
     torch.manual_seed(2)
     theirs.train(1, COUNT)
     torch.manual_seed(2)
-    losses = SacUpdate(ours)(batch)
+    losses = SacUpdate(ours)(batch, 0.01)
     logged = theirs.logger.name_to_value
     assert losses.actor == pytest.approx(logged["train/actor_loss"], rel=1e-5)
     assert losses.critic == pytest.approx(logged["train/critic_loss"], rel=1e-5)

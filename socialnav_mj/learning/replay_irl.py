@@ -33,7 +33,7 @@ from socialnav_mj.learning.reward import (
     log_partition_importance,
     reward_for,
 )
-from socialnav_mj.learning.sac_update import SacUpdate
+from socialnav_mj.learning.sac_update import SacUpdate, actor_network
 from socialnav_mj.learning.shared_buffer import SharedReplayBuffer
 
 
@@ -66,7 +66,7 @@ class ReplayIRL(SAC):
             gradient_steps=config.updates_per_scene_step,
             replay_buffer_class=SharedReplayBuffer,
             replay_buffer_kwargs={"features": features, "seed": config.seed},
-            policy_kwargs={"net_arch": list(config.hidden), "optimizer_kwargs": {"fused": True}},
+            policy_kwargs={"net_arch": list(config.hidden)},
             seed=config.seed,
             device="cpu",
         )
@@ -79,6 +79,7 @@ class ReplayIRL(SAC):
         self.average = deepcopy(self.actor).requires_grad_(False)
         """The actor's average over the updates: the policy that is validated and kept."""
         self._update = SacUpdate(self)
+        self._averages = actor_network(self.average).parameters.flat
         self.random = np.random.default_rng(config.seed + 1)
         self.experts = ExpertSampler(experts, features)
         self.seconds = {"sac": 0.0, "reward": 0.0}
@@ -91,13 +92,11 @@ class ReplayIRL(SAC):
         """Control steps of the training scene so far; SB3 counts one for every slot."""
         return self.num_timesteps // self.n_envs
 
-    @torch.no_grad()
     def _average_actor(self) -> None:
         """Let the average take the actor in as update `updates`: polynomial-decay averaging."""
         power = self.config.averaging_power
-        averages: list[torch.Tensor] = list(self.average.parameters())
-        actor: list[torch.Tensor] = list(self.actor.parameters())
-        torch._foreach_lerp_(averages, actor, (power + 1.0) / (self.updates + power))
+        share = (power + 1.0) / (self.updates + power)
+        self._averages += share * (self._update.actor.parameters.flat - self._averages)
 
     def _sample_action(
         self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1
@@ -166,11 +165,11 @@ class ReplayIRL(SAC):
             gradient_steps: SAC updates.
             batch_size: Of SAC.
         """
-        optimizers = [self.actor.optimizer, self.critic.optimizer, self._update.temperature_optimizer]
-        self._update_learning_rate(optimizers)
+        learning_rate = self.lr_schedule(self._current_progress_remaining)
+        self.logger.record("train/learning_rate", learning_rate)
         for _ in range(gradient_steps):
             begin = perf_counter()
-            losses = self._update(self.replay_buffer.sample(batch_size))
+            losses = self._update(self.replay_buffer.sample(batch_size), learning_rate)
             self.updates += 1
             self._average_actor()
             self.seconds["sac"] += perf_counter() - begin
@@ -231,14 +230,12 @@ class ReplayIRL(SAC):
         Returns:
             Tensors and plain values, readable with torch.load(weights_only=True).
         """
-        assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
+        assert self.log_ent_coef is not None  # of the automatic temperature
         return {
             "policy": self.policy.state_dict(),
             "average": self.average.state_dict(),
-            "actor_optimizer": self.actor.optimizer.state_dict(),
-            "critic_optimizer": self.critic.optimizer.state_dict(),
             "log_ent_coef": self.log_ent_coef.detach(),
-            "ent_coef_optimizer": self.ent_coef_optimizer.state_dict(),
+            "optimizers": {name: adam.state() for name, adam in self._update.optimizers.items()},
             "reward_net": self.reward_net.state_dict(),
             "reward_optimizer": self.reward_optimizer.state_dict(),
             "num_timesteps": self.num_timesteps,
@@ -258,14 +255,13 @@ class ReplayIRL(SAC):
         Args:
             state: As `checkpoint` returns it.
         """
-        assert self.log_ent_coef is not None and self.ent_coef_optimizer is not None  # of the automatic temperature
+        assert self.log_ent_coef is not None  # of the automatic temperature
         self.policy.load_state_dict(state["policy"])
         self.average.load_state_dict(state["average"])
-        self.actor.optimizer.load_state_dict(state["actor_optimizer"])
-        self.critic.optimizer.load_state_dict(state["critic_optimizer"])
+        for name, adam in self._update.optimizers.items():
+            adam.restore(state["optimizers"][name])
         with torch.no_grad():
             self.log_ent_coef.copy_(state["log_ent_coef"])
-        self.ent_coef_optimizer.load_state_dict(state["ent_coef_optimizer"])
         self.reward_net.load_state_dict(state["reward_net"])
         self.reward_optimizer.load_state_dict(state["reward_optimizer"])
         self.num_timesteps, self.updates = int(state["num_timesteps"]), int(state["updates"])

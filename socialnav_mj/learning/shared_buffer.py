@@ -60,6 +60,7 @@ class SharedReplayBuffer(ReplayBuffer):
         self.log_probs = np.zeros(self.buffer_size, dtype=np.float32)
         self.runs = np.full(self.buffer_size, -1, dtype=np.int64)
         self.previous = np.full(self.buffer_size, -1, dtype=np.int64)
+        self._is_absorbing = np.zeros(self.buffer_size, dtype=bool)
         self._slot_run = np.arange(n_envs, dtype=np.int64)
         self._slot_row = np.full(n_envs, -1, dtype=np.int64)
         self._next_run = n_envs
@@ -90,6 +91,7 @@ class SharedReplayBuffer(ReplayBuffer):
             self.observations[row, 0], self.next_observations[row, 0] = observation[slot], next_observation[slot]
             self.actions[row, 0], self.dones[row, 0] = action[slot], done[slot]
             self.timeouts[row, 0] = infos[slot].get("TimeLimit.truncated", False)
+            self._is_absorbing[row] = done[slot] and not self.timeouts[row, 0]
             self.log_probs[row], self.rewards[row, 0] = log_prob[slot], reward[slot]
             self.runs[row], self.previous[row] = self._slot_run[slot], self._slot_row[slot]
             self._slot_row[slot] = row
@@ -115,14 +117,14 @@ class SharedReplayBuffer(ReplayBuffer):
         turned = self.random.random(batch_size) < 0.5
         action = self.actions[rows, 0].copy()
         action[turned, 1] *= -1.0
-        next_state = self.to_torch(self.mirror(self.next_observations[rows, 0], turned))
-        terminal = self.to_torch(done)
+        next_state = torch.from_numpy(self.mirror(self.next_observations[rows, 0], turned))
+        terminal = torch.from_numpy(done)
         return ReplayBufferSamples(
-            self.to_torch(self.mirror(self.observations[rows, 0], turned)),
-            self.to_torch(action),
+            torch.from_numpy(self.mirror(self.observations[rows, 0], turned)),
+            torch.from_numpy(action),
             next_state,
             terminal,
-            self.reward_of(next_state, terminal, self.to_torch(self.rewards[rows])),
+            self.reward_of(next_state, terminal, torch.from_numpy(self.rewards[rows])),
         )
 
     def sample_states(self, batch_size: int, absorbing_share: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -136,7 +138,7 @@ class SharedReplayBuffer(ReplayBuffer):
             States that actions led to, shape (batch_size, size), and the log densities of these actions.
         """
         size = self.size()
-        absorbed = np.flatnonzero((self.dones[:size, 0] > 0.0) & (self.timeouts[:size, 0] == 0.0))
+        absorbed = np.flatnonzero(self._is_absorbing[:size])
         count = round(batch_size * absorbing_share) if absorbed.size else 0
         rows = self.random.integers(size, size=batch_size)
         rows[:count] = self.random.choice(absorbed, size=count) if count else rows[:0]
@@ -189,6 +191,7 @@ class SharedReplayBuffer(ReplayBuffer):
         """
         for name in (*_ARRAYS, *_OWN_ARRAYS):
             getattr(self, name)[: len(state[name])] = state[name]
+        self._is_absorbing = (self.dones[:, 0] > 0.0) & (self.timeouts[:, 0] == 0.0)
         self.pos, self.full, self._next_run = int(state["cursor"][0]), bool(state["cursor"][1]), int(state["cursor"][2])
         self._slot_run[:], self._slot_row[:] = state["slot_run"], state["slot_row"]
         self.random.bit_generator.state = json.loads(state["random"])

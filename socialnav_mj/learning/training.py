@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
+from threadpoolctl import threadpool_limits
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.envs.guided import CrowdSettings
@@ -53,6 +54,7 @@ def train(
     folder = Path(folder)
     claim(folder, config.as_dict())
     torch.set_num_threads(1)
+    threadpool_limits(1)  # of numpy's products
     recordings = [load_recording(name, data_dir=data_dir) for name in config.datasets]
     features = feature_set(config.features)
     training = [window(recording, *config.train_window) for recording in recordings]
