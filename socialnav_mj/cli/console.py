@@ -130,6 +130,24 @@ class _PaceColumn(ProgressColumn):
         return Text(f"{rate:.0f} x real time, {until} left", style="progress.remaining")
 
 
+class _Lines:
+    """Progress where there is no terminal for a bar."""
+
+    def __init__(self) -> None:
+        self._said = monotonic()
+
+    def tell(self, text: str, *, now: bool = False) -> None:
+        """Say it if nothing was said for long.
+
+        Args:
+            text: A line.
+            now: Whether to say it anyhow.
+        """
+        if not errors.is_terminal and (now or monotonic() - self._said >= _QUIET_TIME):
+            self._said = monotonic()
+            say(text, errors)
+
+
 def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
     """Run episodes behind a bar with their rate and the time left; tell at once what went wrong."""
     from socialnav_mj.cli.pace import Pace
@@ -144,13 +162,11 @@ def follow(episodes: "Iterator[Done]", jobs: "list[Job]") -> None:
     )
     with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
         bar = progress.add_task("episodes", total=len(jobs))
-        said = monotonic()
+        lines = _Lines()
         for count, done in enumerate(episodes, start=1):
             pace.note(done)
             progress.update(bar, advance=1)
-            if not errors.is_terminal and (monotonic() - said >= _QUIET_TIME or count == len(jobs)):
-                said = monotonic()
-                say(f"episodes {count}/{len(jobs)}", errors)
+            lines.tell(f"episodes {count}/{len(jobs)}", now=count == len(jobs))
             if done.error is not None:
                 say(f"{done.job.file_name}: {done.error}", failures if errors.quiet else progress.console, style="red")
 
@@ -160,20 +176,18 @@ def scoring() -> "Iterator[Watcher]":
     """What tells how far the scoring is: a bar where there is a terminal, else a line now and then."""
     with ExitStack() as stack:
         bars: list[tuple[Progress, TaskID]] = []
-        began = said = monotonic()
+        began, lines = monotonic(), _Lines()
 
         def tell(count: int, total: int) -> None:
-            nonlocal began, said
+            nonlocal began, lines
             if count == 1:
-                began = said = monotonic()
+                began, lines = monotonic(), _Lines()
             if errors.is_terminal and not bars and monotonic() - began >= _PATIENCE:
                 progress = stack.enter_context(counted_progress())
                 bars.append((progress, progress.add_task("scoring")))
             for progress, bar in bars:
                 progress.update(bar, completed=count, total=total)
-            if not errors.is_terminal and monotonic() - said >= _QUIET_TIME:
-                said = monotonic()
-                say(f"scored {count}/{total}", errors)
+            lines.tell(f"scored {count}/{total}")
             if count == total:
                 stack.close()
                 bars.clear()

@@ -189,24 +189,22 @@ class ReplayIRL(SAC):
             group["lr"] = self.lr_schedule(self._current_progress_remaining)
         if config.partition == "segment":
             states, log_prob = self.replay_buffer.sample_segments(config.batch_size, config.segment_length)
-            expert_reward = self.reward_net(expert := self._expert_states(states[:, 0]))
-            policy = torch.as_tensor(states)
-            policy_reward = self.reward_net(policy)
+            policy, sequences = torch.as_tensor(states[:, 0]), torch.as_tensor(states)
+            expert = self._expert_states(states[:, 0])
+            expert_reward, segment_reward = self.reward_net(expert), self.reward_net(sequences)
             log_partition, effective = log_partition_importance(
-                policy_reward.sum(dim=1), torch.as_tensor(log_prob).sum(dim=1)
+                segment_reward.sum(dim=1), torch.as_tensor(log_prob).sum(dim=1)
             )
-            loss = irl_loss(expert_reward, log_partition / config.segment_length)
-            policy, policy_reward = policy[:, 0], policy_reward[:, 0]
+            log_partition, policy_reward = log_partition / config.segment_length, segment_reward[:, 0]
         else:
             states, log_prob = self.replay_buffer.sample_states(config.batch_size, config.absorbing_share)
-            expert_reward = self.reward_net(expert := self._expert_states(states))
-            policy = torch.as_tensor(states)
-            policy_reward = self.reward_net(policy)
+            policy, expert = torch.as_tensor(states), self._expert_states(states)
+            expert_reward, policy_reward = self.reward_net(torch.stack([expert, policy]))
             if config.partition == "importance":
                 log_partition, effective = log_partition_importance(policy_reward, torch.as_tensor(log_prob))
             else:
                 log_partition, effective = log_partition_fused(policy_reward, expert_reward)
-            loss = irl_loss(expert_reward, log_partition)
+        loss = irl_loss(expert_reward, log_partition)
         mix = torch.as_tensor(self.random.random((config.batch_size, 1)), dtype=torch.float32)
         penalty = gradient_penalty(self.reward_net, expert, policy, mix)
         size = 0.5 * (expert_reward**2).mean() + 0.5 * (policy_reward**2).mean()
