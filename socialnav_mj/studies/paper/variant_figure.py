@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from socialnav_mj.report.style import new_figure, save, style
 from socialnav_mj.studies.levels import LevelTable
 from socialnav_mj.studies.looks import LOOKS, short_title
 from socialnav_mj.studies.panel import METHODS
+
+_TITLE_WIDTH = 24
+"""Characters of a line of a setting's title: longer ones would leave the panels no room."""
 
 
 def draw_variants(tables: Mapping[str, LevelTable], titles: Mapping[str, str], folder: Path) -> list[Path]:
@@ -51,7 +55,7 @@ def draw_variants(tables: Mapping[str, LevelTable], titles: Mapping[str, str], f
             axes.grid(visible=False, axis="y")
             for y in range(1, len(names)):
                 axes.axhline(y - 0.5, color="#BBBBBB", linewidth=0.5)
-        row[0].set_yticks(range(len(names)), [titles[name] for name in names])
+        row[0].set_yticks(range(len(names)), [fill(titles[name], _TITLE_WIDTH) for name in names])
         row[0].set_ylim(len(names) - 0.5, -0.5)
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=5)
