@@ -18,7 +18,6 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
-from stable_baselines3.common.distributions import SquashedDiagGaussianDistribution
 from stable_baselines3.common.noise import ActionNoise
 
 from socialnav_mj.envs.sb3 import CrowdVecEnv
@@ -86,6 +85,8 @@ class ReplayIRL(SAC):
         """CPU-bound time spent so far, by kind [s]."""
         self.updates = 0
         """SAC updates so far."""
+        self._log_prob: NDArray[Any] = np.zeros(env.num_envs)
+        """Log densities of the actions of the step under way."""
 
     @property
     def scene_steps(self) -> int:
@@ -112,10 +113,12 @@ class ReplayIRL(SAC):
             The action, twice: actions are not rescaled.
         """
         if self.num_timesteps >= learning_starts:
-            return super()._sample_action(learning_starts, action_noise, n_envs)
+            assert isinstance(self._last_obs, np.ndarray)
+            action, self._log_prob = self._update.act(self._last_obs)
+            return action, action
         noise = self.random.normal(size=(n_envs, 2))
         sigma = self.config.guide_noise
-        self._guide_log_prob = -0.5 * (noise**2).sum(axis=1) - 2.0 * math.log(sigma * math.sqrt(2.0 * math.pi))
+        self._log_prob = -0.5 * (noise**2).sum(axis=1) - 2.0 * math.log(sigma * math.sqrt(2.0 * math.pi))
         action = np.clip(self.crowd.guide_action() + sigma * noise, -1.0, 1.0).astype(np.float32)
         return action, action
 
@@ -144,19 +147,8 @@ class ReplayIRL(SAC):
             next_obs[slot] = infos[slot]["terminal_observation"]
         before = self._last_obs
         assert isinstance(before, np.ndarray)
-        log_prob = self._log_prob(before, buffer_action)
-        replay_buffer.store(before, next_obs, buffer_action, dones, infos, log_prob, reward)
+        replay_buffer.store(before, next_obs, buffer_action, dones, infos, self._log_prob, reward)
         self._last_obs = self._last_original_obs = new_obs
-
-    def _log_prob(self, observation: NDArray[Any], action: NDArray[Any]) -> NDArray[Any]:
-        # The step's time steps are counted before its transitions are stored.
-        if self.num_timesteps - self.n_envs < self.learning_starts:
-            return self._guide_log_prob
-        with torch.no_grad():
-            mean, log_std, _ = self.actor.get_action_dist_params(torch.as_tensor(observation))
-            distribution = SquashedDiagGaussianDistribution(action.shape[1]).proba_distribution(mean, log_std)
-            result: NDArray[Any] = distribution.log_prob(torch.as_tensor(action)).numpy()
-        return result
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """SAC updates with reward steps between them.

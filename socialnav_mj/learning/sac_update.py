@@ -73,14 +73,10 @@ class SacUpdate:
         model, count = self.model, len(batch.observations)
         seen, following = batch.observations.numpy(), batch.next_observations.numpy()
         both = self.actor.forward(np.concatenate([seen, following]))
-        mean, raw_log_std = np.split(both[-1][0], 2, axis=1)
-        log_std = raw_log_std.clip(LOG_STD_MIN, LOG_STD_MAX)
-        size = mean.shape[1]
+        size = both[-1].shape[-1] // 2
         noise = torch.cat([torch.randn(count, size), torch.randn(count, size)]).numpy()
-        spread = np.exp(log_std) * noise
-        action = torch.tanh(torch.from_numpy(mean + spread)).numpy()  # rounded as the library does, near 1
+        action, spread, log_prob = _squashed(both[-1][0], noise)
         slope = 1.0 - action**2
-        log_prob = (-0.5 * noise**2 - log_std - _HALF_LOG_TWO_PI - np.log(slope + _EPSILON)).sum(axis=1)
 
         log_temperature = float(self.log_temperature.flat[0])
         temperature = math.exp(log_temperature)
@@ -96,7 +92,7 @@ class SacUpdate:
         self.critics.backward(values, error / count)
         self.optimizers["critic"].step(learning_rate)
 
-        action, slope, spread, raw = action[:count], slope[:count], spread[:count], raw_log_std[:count]
+        action, slope, spread, raw = action[:count], slope[:count], spread[:count], both[-1][0, :count, size:]
         of_action, least = self._of_action(seen, action)
         of_sum = (temperature * 2.0 * action * slope / (slope + _EPSILON) - of_action * slope) / count
         of_log_std = of_sum * spread - temperature / count
@@ -116,6 +112,19 @@ class SacUpdate:
             entropy_coefficient=temperature,
         )
 
+    def act(self, observation: Array) -> tuple[Array, Array]:
+        """Draw actions of the actor.
+
+        Args:
+            observation: Shape (n, observation size).
+
+        Returns:
+            Actions in [-1, 1], shape (n, action size), and their log densities, shape (n,).
+        """
+        output = self.actor.forward(observation)[-1][0]
+        action, _, log_prob = _squashed(output, torch.randn(len(output), output.shape[1] // 2).numpy())
+        return action, log_prob
+
     def _of_action(self, observation: Array, action: Array) -> tuple[Array, float]:
         """Gradient of the lesser critic's value by the action, and the mean of that value."""
         values = self.critics.forward(np.concatenate([observation, action], axis=1))
@@ -123,6 +132,16 @@ class SacUpdate:
         share = np.where(first < second, 1.0, np.where(first > second, 0.0, 0.5)).astype(np.float32)  # of equals half
         of_both = self.critics.backward_to_inputs(values, np.stack([share, 1.0 - share]), observation.shape[1])
         return of_both.sum(axis=0), float(np.minimum(first, second).mean())
+
+
+def _squashed(output: Array, noise: Array) -> tuple[Array, Array, Array]:
+    """Actions of the actor's output and standard normal noise, what noise moves them by before tanh, log densities."""
+    mean, raw_log_std = np.split(output, 2, axis=1)
+    log_std = raw_log_std.clip(LOG_STD_MIN, LOG_STD_MAX)
+    spread = np.exp(log_std) * noise
+    action = torch.tanh(torch.from_numpy(mean + spread)).numpy()  # rounded as the library does, near 1
+    log_prob = -0.5 * noise**2 - log_std - _HALF_LOG_TWO_PI - np.log(1.0 - action**2 + _EPSILON)
+    return action, spread, log_prob.sum(axis=1)
 
 
 def actor_network(actor: Any) -> Perceptrons:
