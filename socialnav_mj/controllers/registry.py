@@ -19,6 +19,7 @@ from socialnav_mj.controllers.hybrid import Hybrid
 from socialnav_mj.controllers.identity import json_value, parameters_of
 from socialnav_mj.controllers.irl_mpc import IRLMPC
 from socialnav_mj.controllers.learned_selector import LearnedSelector
+from socialnav_mj.controllers.medirl_sam import MEDIRLSAM
 from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.mpdm import MPDM
 from socialnav_mj.controllers.mppi import MPPI
@@ -49,6 +50,7 @@ BUILT_IN: dict[str, Callable[..., Controller]] = {
     "irl_mpc": IRLMPC,
     "learned_selector": LearnedSelector,
     "attention": Attention,
+    "medirl_sam": MEDIRLSAM,
 }
 
 
