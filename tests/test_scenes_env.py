@@ -30,6 +30,7 @@ from socialnav_mj.envs.scenes import ScenesVecEnv, scene_seed
 from socialnav_mj.envs.worker import WorkerError
 from socialnav_mj.features import feature_set
 from socialnav_mj.features.continuous import Continuous
+from socialnav_mj.processes import in_processes
 from socialnav_mj.recordings import load_recording
 
 SLOTS = 3
@@ -90,6 +91,17 @@ def scenes(n_scenes=2, seed=3, **changes) -> ScenesVecEnv:
 
 def alone(scene, seed=3, **changes) -> CrowdVecEnv:
     return CrowdVecEnv(settings(**changes), seed=scene_seed(seed, scene))
+
+
+def first_sight() -> np.ndarray:
+    with closing(scenes(1)) as env:
+        return env.reset()
+
+
+def test_scenes_start_in_a_worker_of_joblib_too():
+    """Several trainings run in such workers; how these were started is nothing that a scene's process could repeat."""
+    (seen,) = in_processes(first_sight, [()], n_jobs=2)
+    np.testing.assert_array_equal(seen, alone(0).reset())
 
 
 @pytest.fixture(scope="module")

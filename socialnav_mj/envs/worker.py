@@ -3,12 +3,12 @@
 import pickle
 import signal
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from ctypes import Array as SharedBytes
 from ctypes import c_char
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, get_start_method, set_start_method
 from multiprocessing.connection import Connection
 from multiprocessing.resource_tracker import ensure_running
 from time import process_time
@@ -206,7 +206,7 @@ class Worker:
         ensure_running()
         try:
             # Ctrl-C goes to all processes of a terminal; here it is for the first one, which then ends the others.
-            with held_back((signal.SIGINT, signal.SIGHUP)):
+            with held_back((signal.SIGINT, signal.SIGHUP)), _start_method("spawn"):
                 self._process.start()
         finally:
             theirs.close()
@@ -265,3 +265,14 @@ class Worker:
             self._process.kill()
             self._process.join()
         self._process.close()
+
+
+@contextmanager
+def _start_method(name: str) -> Iterator[None]:
+    """Processes are told how their parent starts others: joblib's have a way of their own, which ours do not know."""
+    before = get_start_method(allow_none=True)
+    set_start_method(name, force=True)
+    try:
+        yield
+    finally:
+        set_start_method(before, force=True)

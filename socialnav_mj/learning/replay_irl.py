@@ -2,12 +2,12 @@
 
 SAC is stable-baselines3's. It learns from the reward that the reward network gives at the moment of sampling; between
 its updates a reward step compares expert states with states of the same buffer, so the reward costs no environment
-step.
+step. The updates that follow a step of the scene are made while it makes the next one.
 """
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import asdict
 from time import perf_counter
@@ -21,9 +21,11 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.noise import ActionNoise
 
 from socialnav_mj.envs.sb3 import CrowdVecEnv
+from socialnav_mj.envs.scenes import ScenesVecEnv
 from socialnav_mj.features import FeatureSet
 from socialnav_mj.learning.config import TrainingConfig
 from socialnav_mj.learning.experts import Demonstrations, ExpertSampler
+from socialnav_mj.learning.meanwhile import Meanwhile
 from socialnav_mj.learning.reward import (
     RewardNet,
     gradient_penalty,
@@ -41,7 +43,9 @@ class ReplayIRL(SAC):
 
     replay_buffer: SharedReplayBuffer
 
-    def __init__(self, env: CrowdVecEnv, experts: Demonstrations, features: FeatureSet, config: TrainingConfig) -> None:
+    def __init__(
+        self, env: CrowdVecEnv | ScenesVecEnv, experts: Demonstrations, features: FeatureSet, config: TrainingConfig
+    ) -> None:
         """Make the networks and the buffer.
 
         Args:
@@ -51,9 +55,13 @@ class ReplayIRL(SAC):
             config: Of the training.
         """
         self.config, self.features, self.crowd = config, features, env
+        self._due = 0
+        """SAC updates that are to be made while the scene steps."""
+        self._rate = config.learning_rate
+        """Learning rate of these."""
         super().__init__(
             "MlpPolicy",
-            env,
+            Meanwhile(env, self._catch_up),
             learning_rate=lambda left: config.learning_rate * (0.1 + 0.9 * left),
             buffer_size=config.buffer_size,
             learning_starts=config.guided_scene_steps * env.num_envs,
@@ -151,17 +159,22 @@ class ReplayIRL(SAC):
         self._last_obs = self._last_original_obs = new_obs
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """SAC updates with reward steps between them.
+        """Leave updates for the next step of the scene.
 
         Args:
             gradient_steps: SAC updates.
-            batch_size: Of SAC.
+            batch_size: The configuration's is taken.
         """
-        learning_rate = self.lr_schedule(self._current_progress_remaining)
-        self.logger.record("train/learning_rate", learning_rate)
-        for _ in range(gradient_steps):
+        self._due, self._rate = gradient_steps, self.lr_schedule(self._current_progress_remaining)
+
+    def _catch_up(self) -> None:
+        """Make the SAC updates that are due, with reward steps between them."""
+        if not self._due:
+            return
+        self.logger.record("train/learning_rate", self._rate)
+        for _ in range(self._due):
             begin = perf_counter()
-            losses = self._update(self.replay_buffer.sample(batch_size), learning_rate)
+            losses = self._update(self.replay_buffer.sample(self.config.batch_size), self._rate)
             self.updates += 1
             self._average_actor()
             self.seconds["sac"] += perf_counter() - begin
@@ -169,7 +182,8 @@ class ReplayIRL(SAC):
                 begin = perf_counter()
                 self.reward_step()
                 self.seconds["reward"] += perf_counter() - begin
-        self._n_updates += gradient_steps
+        self._n_updates += self._due
+        self._due = 0
         self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
         for name, value in asdict(losses).items():
             self.logger.record(f"train/{name}", value)
@@ -178,7 +192,7 @@ class ReplayIRL(SAC):
         """One step of the reward network on the shared buffer."""
         config = self.config
         for group in self.reward_optimizer.param_groups:
-            group["lr"] = self.lr_schedule(self._current_progress_remaining)
+            group["lr"] = self._rate
         if config.partition == "segment":
             states, log_prob = self.replay_buffer.sample_segments(config.batch_size, config.segment_length)
             policy, sequences = torch.as_tensor(states[:, 0]), torch.as_tensor(states)
@@ -231,6 +245,8 @@ class ReplayIRL(SAC):
             "num_timesteps": self.num_timesteps,
             "updates": self.updates,
             "n_updates": self._n_updates,
+            "due": self._due,
+            "rate": self._rate,
             "seconds": dict(self.seconds),
             "torch_random": torch.get_rng_state(),
             "random": json.dumps(self.random.bit_generator.state),
@@ -255,7 +271,7 @@ class ReplayIRL(SAC):
         self.reward_net.load_state_dict(state["reward_net"])
         self.reward_optimizer.load_state_dict(state["reward_optimizer"])
         self.num_timesteps, self.updates = int(state["num_timesteps"]), int(state["updates"])
-        self._n_updates = int(state["n_updates"])
+        self._n_updates, self._due, self._rate = int(state["n_updates"]), int(state["due"]), float(state["rate"])
         self.seconds = dict(state["seconds"])
         torch.set_rng_state(state["torch_random"])
         self.random.bit_generator.state = json.loads(state["random"])
@@ -265,10 +281,16 @@ class ReplayIRL(SAC):
         self._last_obs = self._last_original_obs = self.crowd.restore(_as_arrays(state["crowd"]))
 
 
-def _as_tensors(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Arrays as what torch reads back without running code."""
-    return {k: torch.from_numpy(v) if isinstance(v, np.ndarray) else v for k, v in values.items()}
+def _as_tensors(value: Any) -> Any:
+    """Arrays as what torch reads back without running code, in dictionaries and lists."""
+    return _each(value, lambda one: torch.from_numpy(one) if isinstance(one, np.ndarray) else one)
 
 
-def _as_arrays(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: v.numpy() if isinstance(v, torch.Tensor) else v for k, v in values.items()}
+def _as_arrays(value: Any) -> Any:
+    return _each(value, lambda one: one.numpy() if isinstance(one, torch.Tensor) else one)
+
+
+def _each(value: Any, change: Callable[[Any], Any]) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _each(one, change) for name, one in value.items()}
+    return [_each(one, change) for one in value] if isinstance(value, list) else change(value)

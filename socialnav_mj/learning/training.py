@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from socialnav_mj.config import Scenario
 from socialnav_mj.envs.guided import CrowdSettings
-from socialnav_mj.envs.sb3 import CrowdVecEnv
+from socialnav_mj.envs.scenes import ScenesVecEnv
 from socialnav_mj.features import feature_set
 from socialnav_mj.files import write_whole, written_whole
 from socialnav_mj.learning.config import TrainingConfig
@@ -84,23 +85,23 @@ def train(
         turn_limit=config.turn_limit,
         guide=config.guide,
     )
-    env = CrowdVecEnv(settings, seed=config.seed)
-    model = ReplayIRL(env, experts, features, config)
-    model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
-    if stored is not None:
-        model.restore(stored["model"])
-    if progress is not None:
-        progress(Progress(scene_steps=model.scene_steps, transitions=model.replay_buffer.size(), validation=None))
-    left = config.scene_steps - model.scene_steps
-    if left > 0:
-        callback = _Checkpoints(config, folder, recordings, history, progress)
-        model.learn(left * env.num_envs, callback=callback, reset_num_timesteps=False, log_interval=1)
+    with closing(ScenesVecEnv(settings, n_scenes=1, seed=config.seed)) as env:
+        model = ReplayIRL(env, experts, features, config)
+        model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
+        if stored is not None:
+            model.restore(stored["model"])
+        if progress is not None:
+            progress(Progress(scene_steps=model.scene_steps, transitions=model.replay_buffer.size(), validation=None))
+        left = config.scene_steps - model.scene_steps
+        if left > 0:
+            callback = _Checkpoints(config, folder, recordings, history, progress)
+            model.learn(left * env.num_envs, callback=callback, reset_num_timesteps=False, log_interval=1)
     complete_card(folder / BEST, config, recordings, history)
     return folder / BEST
 
 
 class _Checkpoints(BaseCallback):
-    """Every so many scene steps: validate, keep the best policy, and write a checkpoint when the updates are done."""
+    """Every so many scene steps: validate, keep the best policy, and write a checkpoint before the next step."""
 
     def __init__(
         self,
@@ -118,7 +119,7 @@ class _Checkpoints(BaseCallback):
         self._is_due = False
 
     def _on_rollout_start(self) -> None:
-        """Between two steps of the scene: after the updates that followed a validation, all can be brought back."""
+        """Between two steps of the scene all can be brought back."""
         self._write_due_checkpoint()
 
     def _on_training_end(self) -> None:
