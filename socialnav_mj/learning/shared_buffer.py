@@ -60,7 +60,6 @@ class SharedReplayBuffer(ReplayBuffer):
         self.log_probs = np.zeros(self.buffer_size, dtype=np.float32)
         self.runs = np.full(self.buffer_size, -1, dtype=np.int64)
         self.previous = np.full(self.buffer_size, -1, dtype=np.int64)
-        self._is_absorbing = np.zeros(self.buffer_size, dtype=bool)
         self._slot_run = np.arange(n_envs, dtype=np.int64)
         self._slot_row = np.full(n_envs, -1, dtype=np.int64)
         self._next_run = n_envs
@@ -91,7 +90,6 @@ class SharedReplayBuffer(ReplayBuffer):
             self.observations[row, 0], self.next_observations[row, 0] = observation[slot], next_observation[slot]
             self.actions[row, 0], self.dones[row, 0] = action[slot], done[slot]
             self.timeouts[row, 0] = infos[slot].get("TimeLimit.truncated", False)
-            self._is_absorbing[row] = done[slot] and not self.timeouts[row, 0]
             self.log_probs[row], self.rewards[row, 0] = log_prob[slot], reward[slot]
             self.runs[row], self.previous[row] = self._slot_run[slot], self._slot_row[slot]
             self._slot_row[slot] = row
@@ -138,7 +136,7 @@ class SharedReplayBuffer(ReplayBuffer):
             States that actions led to, shape (batch_size, size), and the log densities of these actions.
         """
         size = self.size()
-        absorbed = np.flatnonzero(self._is_absorbing[:size])
+        absorbed = np.flatnonzero((self.dones[:size, 0] > 0.0) & (self.timeouts[:size, 0] == 0.0))
         count = round(batch_size * absorbing_share) if absorbed.size else 0
         rows = self.random.integers(size, size=batch_size)
         rows[:count] = self.random.choice(absorbed, size=count) if count else rows[:0]
@@ -191,7 +189,6 @@ class SharedReplayBuffer(ReplayBuffer):
         """
         for name in (*_ARRAYS, *_OWN_ARRAYS):
             getattr(self, name)[: len(state[name])] = state[name]
-        self._is_absorbing = (self.dones[:, 0] > 0.0) & (self.timeouts[:, 0] == 0.0)
         self.pos, self.full, self._next_run = int(state["cursor"][0]), bool(state["cursor"][1]), int(state["cursor"][2])
         self._slot_run[:], self._slot_row[:] = state["slot_run"], state["slot_row"]
         self.random.bit_generator.state = json.loads(state["random"])
