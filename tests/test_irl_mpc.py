@@ -9,6 +9,7 @@ from socialnav_mj.controllers import controller_config, controller_of, make_cont
 from socialnav_mj.controllers.irl_mpc import IRLMPC
 from socialnav_mj.controllers.planning import learned
 from socialnav_mj.controllers.planning.arrays import plan_costs
+from socialnav_mj.controllers.planning.learned_arrays import learned_costs
 from socialnav_mj.controllers.policy_card import PolicyError
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.features import Continuous, View, running_state
@@ -17,13 +18,13 @@ from socialnav_mj.metrics.outcomes import success
 
 LAYERS = tuple((np.ascontiguousarray(w.T), b) for w, b in load_policy("students003_continuous_seed0").reward)
 TOP = 0.2
-SCALE = np.where(np.arange(16) % 4 == 3, 0.5, 0.0)
+SCALE = np.full(4, 0.5)
 
 
 def asked(seed):
     """Plans of agents in a random crowd, for both ways to ask for the reward."""
     plans, speed, yaw_rate, goal, crowd, terms = random_problem(seed)
-    states = np.full((*plans.shape[:2], 16, 6), np.nan)
+    states = np.full((*plans.shape[:2], 4, 6), np.nan)
     base, _ = plan_costs(plans, speed, yaw_rate, goal, crowd, terms, states)
     return base, states, goal, crowd.x, crowd.y, terms.step, SCALE, TOP, LAYERS
 
@@ -38,11 +39,11 @@ def test_formulas_are_numpys_to_the_stated_accuracy():
 def test_what_a_plan_lacks_in_reward_is_that_of_the_features_an_agent_would_see():
     base, states, goal, x, y, step, scale, top, layers = asked(0)
     policy, features = load_policy("students003_continuous_seed0"), Continuous()
-    found = learned.learned_costs(base, states, goal, x, y, step, scale, top, layers) - base
+    found = learned_costs(base, states, goal, x, y, step, scale, top, layers) - base
     expected = np.zeros_like(base)
     for i, q in np.ndindex(base.shape):
-        for k in (3, 7, 11, 15):
-            own = states[i, q, k]
+        for a, k in enumerate((3, 7, 11, 15)):
+            own = states[i, q, a]
             if np.isnan(own[0]):
                 continue
             heading = np.arctan2(own[3], own[2])
@@ -56,7 +57,7 @@ def test_what_a_plan_lacks_in_reward_is_that_of_the_features_an_agent_would_see(
                 present=np.ones((1, x.shape[2]), dtype=bool),
             )
             reward = policy.reward_of(running_state(features(view)))[0]
-            expected[i, q] += scale[k] * max(top - reward, 0.0)
+            expected[i, q] += scale[a] * max(top - reward, 0.0)
     assert expected.max() > 2.0 * expected.min()
     np.testing.assert_allclose(found, expected, atol=1e-7)
 
@@ -65,7 +66,7 @@ def test_what_a_plan_lacks_in_reward_is_that_of_the_features_an_agent_would_see(
 def test_loops_give_the_bits_of_the_arrays_for_all_plans_that_can_be_best(seed):
     pytest.importorskip("numba")
     problem = asked(seed)
-    expected = learned.learned_costs(*problem)
+    expected = learned_costs(*problem)
     everything = learned.compiled()(*problem, np.full(problem[0].shape, np.inf))
     np.testing.assert_array_equal(everything, expected)
     best = np.full((6, 3), np.inf)
@@ -80,14 +81,14 @@ def test_loops_are_right_without_the_compiler_too():
     base, states, *rest = asked(1)
     problem = (base[:, :3], states[:, :3], *rest)
     found = learned.loop_costs(*problem, np.full((6, 3), np.inf))
-    np.testing.assert_array_equal(found, learned.learned_costs(*problem))
+    np.testing.assert_array_equal(found, learned_costs(*problem))
 
 
 def test_nobody_around_and_plans_given_up_are_no_trouble():
     base, states, goal, x, y, *rest = asked(2)
     base[:, ::2] = np.inf
     empty = (base, states, goal, x[..., :0], y[..., :0], *rest)
-    found = learned.learned_costs(*empty)
+    found = learned_costs(*empty)
     assert np.isinf(found[:, ::2]).all() and np.isfinite(found[:, 1::2]).all()
     if loops := learned.compiled():
         np.testing.assert_array_equal(loops(*empty, np.full(base.shape, np.inf)), found)

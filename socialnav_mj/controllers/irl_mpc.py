@@ -8,6 +8,7 @@ from socialnav_mj.controllers.base import Limits
 from socialnav_mj.controllers.mpc import MPC
 from socialnav_mj.controllers.planning import learned
 from socialnav_mj.controllers.planning.arrays import costs_of
+from socialnav_mj.controllers.planning.learned_arrays import learned_costs
 from socialnav_mj.controllers.planning.planner import STEPS, Preset
 from socialnav_mj.controllers.planning.search import Costs
 from socialnav_mj.controllers.planning.terms import Crowd
@@ -64,18 +65,18 @@ class IRLMPC(MPC):
         self._layers = tuple((np.ascontiguousarray(weight.T), bias) for weight, bias in self._trained.reward)
         at_goal = absorbing_state(self._trained.features.size, GOAL_FLAG)[None]
         self._top = float(self._trained.reward_of(at_goal)[0])
-        asked = np.arange(STEPS) % learned.STRIDE == learned.STRIDE - 1
-        self._scale: Array = np.where(asked, self.learned_weight * learned.STRIDE * self._terms.zone_time, 0.0)
+        every = STEPS // learned.ASKED
+        self._scale: Array = self.learned_weight * every * self._terms.zone_time[every - 1 :: every]
 
     def _costs(self, speed: Array, yaw_rate: Array, goal: Array, crowd: Crowd) -> Costs:
         most = float(self._scale.sum()) * (1.0 + self._top)
 
         def costs(plans: Array, best: Array) -> tuple[Array, Array]:
-            states = np.full((*plans.shape[:2], STEPS, 6), np.nan)
+            states = np.full((*plans.shape[:2], learned.ASKED, 6), np.nan)
             # The reward may turn the order by as much as it can cost.
             base, clearance = costs_of(plans, speed, yaw_rate, goal, crowd, self._terms, best.copy(), most, states)
             asked = (base, states, goal, crowd.x, crowd.y, self._terms.step, self._scale, self._top, self._layers)
             loops = learned.compiled()
-            return (learned.learned_costs(*asked) if loops is None else loops(*asked, best.copy())), clearance
+            return (learned_costs(*asked) if loops is None else loops(*asked, best.copy())), clearance
 
         return costs

@@ -79,8 +79,8 @@ def plan_costs(
         goal: (n, 2) [m].
         crowd: Around each agent, for as many steps as there are terms.
         terms: Limits, motion and shapes of the costs.
-        states: (n, p, steps, 6) filled with place [m], cosine and sine of the heading, speed [m/s] and yaw rate [rad/s]
-            at the end of each step, NaN after the arrival; or `NOT_WANTED`.
+        states: (n, p, s, 6), s a divisor of steps, filled with place [m], cosine and sine of the heading, speed [m/s]
+            and yaw rate [rad/s] at the end of every (steps / s)-th step, NaN after the arrival; or `NOT_WANTED`.
 
     Returns:
         Cost, and the part of it that is for clearance, both (n, p) [s].
@@ -96,6 +96,7 @@ def plan_costs(
     time, within, remaining = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     under_way = np.ones(shape, dtype=bool)
     worst = np.zeros((*shape, crowd.contact.shape[1]))
+    every = len(terms.margin) // max(states.shape[2], 1)
     for k in range(len(terms.margin)):
         first = k * terms.step < t_1
         head_x = np.where(first, first_x, offset_x * to_x - offset_y * to_y)
@@ -123,9 +124,9 @@ def plan_costs(
             weighted = weighted + crowd.entrance_weight[:, e, None] * there
         within = np.where(under_way, within + weighted * terms.zone_time[k], within)
         x, y = next_x, next_y
-        if states.size:
+        if states.size and (k + 1) % every == 0:
             now = np.stack([x, y, cosine, sine, v, w], axis=-1)
-            states[:, :, k] = np.where(under_way[..., None], now, np.nan)
+            states[:, :, k // every] = np.where(under_way[..., None], now, np.nan)
         to_x, to_y = goal[:, :1] - x, goal[:, 1:] - y
         time = np.where(under_way, (k + 1) * terms.step, time)
         remaining = np.where(under_way, np.sqrt(to_x * to_x + to_y * to_y), remaining)

@@ -16,6 +16,9 @@ from socialnav_mj.controllers.planning.terms import Crowd, Terms
 from socialnav_mj.geometry import Array
 
 _TINY = 1e-12
+# Taylor's coefficients; products of them, since a quotient takes as long as ten.
+_S = tuple(1.0 / math.factorial(k) for k in (3, 5, 7, 9, 11))
+_C = tuple(1.0 / math.factorial(k) for k in (2, 4, 6, 8, 10))
 
 
 def _smaller(a: Any, b: Any) -> Any:
@@ -44,8 +47,8 @@ def sine_cosine(angle: Any) -> Any:
 def small_sine_cosine(angle: Any) -> Any:
     """Sine and cosine of angles up to 1 rad, to 1e-9: Taylor's series."""
     z = angle * angle
-    sine = angle * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * (1.0 - z / 110.0)))))
-    cosine = 1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0))))
+    sine = angle * (1.0 - z * (_S[0] - z * (_S[1] - z * (_S[2] - z * (_S[3] - z * _S[4])))))
+    cosine = 1.0 - z * (_C[0] - z * (_C[1] - z * (_C[2] - z * (_C[3] - z * _C[4]))))
     return sine, cosine
 
 
@@ -154,6 +157,7 @@ def loop_costs(
     steps, others, entrances = len(terms.margin), crowd.contact.shape[1], crowd.entrance_x.shape[1]
     sequence = plans.shape[2] != 5
     square = terms.entrance_radius * terms.entrance_radius
+    every = steps // _larger(states.shape[2], 1)
     costs, clearances = np.full((n, p), np.inf), np.full((n, p), np.inf)
     near, count = np.empty((steps, others), dtype=np.int64), np.empty(steps, dtype=np.int64)
     cut, worst = np.empty((steps, others)), np.empty(others)
@@ -218,8 +222,8 @@ def loop_costs(
                         weighted = weighted + crowd.entrance_weight[i, e] * at_entrance(from_x, from_y, terms)
                 within = within + weighted * terms.zone_time[k]
                 x, y = next_x, next_y
-                if states.shape[0] > 0:
-                    own = states[i, q, k]
+                if states.shape[0] > 0 and (k + 1) % every == 0:
+                    own = states[i, q, k // every]
                     own[0], own[1], own[2], own[3], own[4], own[5] = x, y, cosine, sine, v, w
                 to_x, to_y = goal[i, 0] - x, goal[i, 1] - y
                 time = (k + 1) * terms.step
