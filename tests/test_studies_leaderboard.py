@@ -10,7 +10,8 @@ from agents import rows_of, table_of
 from socialnav_mj.cli import main
 from socialnav_mj.report import style
 from socialnav_mj.studies.leaderboard.board import board_of
-from socialnav_mj.studies.leaderboard.families import Family, compare, families_of, verdict
+from socialnav_mj.studies.leaderboard.families import Family, compare, families_of, there, verdict
+from socialnav_mj.studies.leaderboard.page import leaderboard_page
 from socialnav_mj.studies.leaderboard.ranks import rank
 from socialnav_mj.studies.leaderboard.study import Leaderboard
 from socialnav_mj.studies.panel import Entry
@@ -178,7 +179,9 @@ def test_front_leaves_out_whoever_is_beaten_in_both():
         ({"controllers": ("orca", "orca")}, "two or more, each once"),
         ({"settings": ("icy",)}, "unknown setting 'icy'; available: default, turn_per_second"),
         ({"trainings": 0}, "trainings = 0 is not allowed"),
-        ({"setting_draws": 11}, "setting_draws = 11 is not allowed; allowed: 1 to draws = 10"),
+        ({"other_draws": 11}, "other_draws = 11 is not allowed; allowed: 1 to draws = 10"),
+        ({"setting_controllers": ("orcas",)}, "setting_controllers has 'orcas'; allowed: the controllers, "),
+        ({"setting_controllers": ("orca",)}, "none, or two or more, each once"),
     ],
 )
 def test_impossible_boards_are_refused(changes, message):
@@ -211,19 +214,51 @@ def test_other_settings_run_on_the_first_recording_with_policies_for_their_turn_
         controllers=("orca", "go_straight"),
         settings=("radii_0.25", "turn_per_second"),
         draws=20,
-        setting_draws=5,
+        other_draws=5,
     )
     runs = {run.name: run.evaluation for run in study.runs()}
     assert list(runs) == ["students003", "plaza", "students003.radii_0.25", "students003.turn_per_second"]
     assert runs["students003.radii_0.25"].task_kwargs == {"pedestrian_radius": 0.08}
-    assert (runs["plaza"].draws, runs["students003.turn_per_second"].draws) == (20, 5)
+    assert [run.draws for run in runs.values()] == [20, 5, 5, 5]
+
+
+def test_other_settings_may_have_fewer_controllers_and_their_mixtures_the_parts_that_are_there():
+    names = ("orca", "hybrid", "replay_irl", "potential_field", "selector")
+    some = ("hybrid", "replay_irl", "selector")
+    study = Leaderboard(
+        recordings=("students003",), controllers=names, settings=("retire",), setting_controllers=some, trainings=1
+    )
+    assert [entry.method for entry in study.roster("students003")] == [*names, "human"]
+    assert [entry.method for entry in study.roster("students003", "retire")] == [*some, "human"]
+    levels = {name: MADE[name] for name in ("hybrid", "replay_irl")}
+    roster = [Entry(controller=name, method=name) for name in levels]
+    board = board_of(table_of(rows_for(levels)), roster, recording="students003", setting="retire")
+    (family,) = there(families_of(names), board)
+    assert (family.child, family.parents) == ("hybrid", ("replay_irl",))
+    page = leaderboard_page(
+        [board_of_made(), board],
+        families=families_of(names),
+        costs={},
+        provenance={"command": "c", "experiment": {}, "recordings": [], "policies": {}, "runs": {}},
+    )
+    assert "students003, retire on collision" in page and "| students003" in page
 
 
 def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
     out, public = tmp_path / "out", tmp_path / "results"
     command = ["leaderboard", "--recordings", TINY, "--scenarios", "1", "4", "--draws", "3", "--jobs", "1"]
     command += ["--controllers", "go_straight", "potential_field", "--also", "social_force"]
-    command += ["--settings", "radii_0.40", "--setting-draws", "2", "--costs", str(tmp_path / "costs.json")]
+    command += [
+        "--settings",
+        "radii_0.40",
+        "--other-draws",
+        "2",
+        "--setting-controllers",
+        "go_straight",
+        "social_force",
+        "--costs",
+        str(tmp_path / "costs.json"),
+    ]
     (tmp_path / "costs.json").write_text('{"controllers": [{"controller": "social_force", "ratio": 0.123}]}')
     main([*command, "--out", str(out), "--publish", str(public)])
     assert "leaderboard:" in capsys.readouterr().out
@@ -232,7 +267,7 @@ def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
     rows = list(csv.DictReader((public / "tables" / "leaderboard.csv").open()))
     assert {row["controller"] for row in rows} == {"go_straight", "potential_field", "social_force", "human"}
     ranked = [row for row in rows if row["measure"] == "success" and row["controller"] != "human"]
-    assert len(ranked) == 2 * 2 * 3
+    assert len(ranked) == 2 * (3 + 2)
     assert all(1 <= int(row["lowest_rank"]) <= int(row["highest_rank"]) <= 3 for row in ranked)
     page = (public / "README.md").read_text()
     for text in (

@@ -33,8 +33,10 @@ class Leaderboard:
     """Of controllers that learned and have as many, those with the least seeds."""
     settings: tuple[str, ...] = ()
     """Other settings in which the first recording is run: turn_per_second, radii_0.25, radii_0.40, retire."""
-    setting_draws: int | None = None
-    """Draws in these; all by default."""
+    setting_controllers: tuple[str, ...] = ()
+    """Those of the controllers that run in these; all by default."""
+    other_draws: int | None = None
+    """Draws on the other recordings and in the other settings; all by default."""
     costs: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """JSON file of `bench --controllers ... --out FILE`: what each controller costs stands beside its results."""
     scenarios: Scenarios = (1, 2, 3, 4)
@@ -63,7 +65,8 @@ class Leaderboard:
             data_dir=None if self.data_dir is None else str(self.data_dir),
             trainings=self.trainings,
             settings=self.settings,
-            setting_draws=self.setting_draws,
+            setting_controllers=self.setting_controllers,
+            other_draws=self.other_draws,
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             draws=self.draws,
             seed=self.seed,

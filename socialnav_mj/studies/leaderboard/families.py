@@ -48,6 +48,24 @@ def families_of(specs: Sequence[str]) -> tuple[Family, ...]:
     return tuple(families)
 
 
+def there(families: Sequence[Family], board: Board) -> tuple[Family, ...]:
+    """Those of the families that a board can compare.
+
+    Args:
+        families: Of a whole study.
+        board: May have fewer controllers.
+
+    Returns:
+        Whose child is on the board, with the parents that are on it as well.
+    """
+    found = []
+    for family in families:
+        parents = tuple(parent for parent in family.parents if parent in board.controllers)
+        if parents and family.child in board.controllers:
+            found.append(Family(child=family.child, parents=parents, missing=family.missing))
+    return tuple(found)
+
+
 def _flat(parts: Any) -> Iterator[Controller]:
     yield from parts if isinstance(parts, list | tuple) else (parts,)
 

@@ -11,7 +11,7 @@ from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.leaderboard.board import RANKED, Board
-from socialnav_mj.studies.leaderboard.families import Family, compare, verdict
+from socialnav_mj.studies.leaderboard.families import Family, compare, there, verdict
 from socialnav_mj.studies.leaderboard.marks import FAIR_SUCCESS, HIGH_SUCCESS
 from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
@@ -27,7 +27,6 @@ tied, whatever their means. There is no single score: success, nearness to peopl
 **bold** name is on the front of success and nearness: nobody has more success and fewer steps within 1.2 m at once. \
 *Hits on people* are counted for 100 agents, by who moved into whom: the agent alone, both, the person alone. \
 *Impact*: momentum of an agent's hardest collision. *Cost*: CPU time for an agent and step over that of the physics. \
-Of controllers that learned, several trainings were run, and all that is said of them is said of other trainings too. \
 {ONE_RECORDING} Each recording is a task of its own; the last \
 table says how ranks differ between them, which is all that is known of a recording that is not here.
 """
@@ -56,7 +55,7 @@ def leaderboard_page(
     Returns:
         Markdown.
     """
-    lines = ["# Leaderboard", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ]
+    lines = ["# Leaderboard", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ, *_counted(boards), ""]
     lines += ["![fronts](figures/fronts.png)", "", _FIGURE, ""]
     if any(board.marks for board in boards):
         lines += ["## Marks", "", *_marks(boards), ""]
@@ -69,6 +68,22 @@ def leaderboard_page(
             lines += [f"### {heading}", "", *_scenario(board, scenario, costs), ""]
     lines += ["## Ranks over recordings and scenarios", "", *_over_all(boards), ""]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
+
+
+def _counted(boards: Sequence[Board]) -> list[str]:
+    """How many draws and trainings stand behind each board."""
+    rows = []
+    for board in boards:
+        own = [level for level in board.table.rows if level.measure == "success"]
+        several = {level.method: level.interval.n_trainings for level in own if level.interval.n_trainings > 1}
+        draws = max(level.interval.n_draws for level in own)
+        rows.append([_title(board), str(draws), ", ".join(f"{name}: {n}" for name, n in several.items()) or "-"])
+    return [
+        *table(["board", "draws", "several trainings"], rows),
+        "",
+        "What is said of controllers with several trainings is said of other trainings too; of others, of the one "
+        "that ran.",
+    ]
 
 
 def _title(board: Board) -> str:
@@ -107,7 +122,7 @@ def _families(boards: Sequence[Board], families: Sequence[Family]) -> list[str]:
     lines = [_FAMILIES, ""]
     for board in boards:
         rows = []
-        for family in families:
+        for family in there(families, board):
             verdicts = " / ".join(verdict(board, family, scenario) for scenario in board.scenarios)
             found = compare(board, family)
             for parent in family.parents:
@@ -118,7 +133,7 @@ def _families(boards: Sequence[Board], families: Sequence[Family]) -> list[str]:
                 ]
                 rows.append([family.child, parent, *cells, verdicts])
         heads = ["controller", "part", "success", "share of steps", "verdict by scenario"]
-        lines += [f"{_title(board)}:", "", *table(heads, rows), ""]
+        lines += [f"{_title(board)}:", "", *table(heads, rows), ""] if rows else []
     missing = {name: family.child for family in families for name in family.missing}
     lines += [f"Not on the board: {name}, a part of {child}." for name, child in missing.items()]
     return lines
@@ -174,6 +189,7 @@ def _set(board: Board, scenario: str, measure: str, place: int) -> str:
 
 def _over_all(boards: Sequence[Board]) -> list[str]:
     """Least and greatest rank of each controller over all tasks, and its rank by mean in the middle."""
+    boards = [board for board in boards if board.setting == DEFAULT]
     rows = []
     for place, name in enumerate(boards[0].controllers):
         cells = []

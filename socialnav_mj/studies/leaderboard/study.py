@@ -12,7 +12,7 @@ from socialnav_mj.report.results import Results
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
 from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
-from socialnav_mj.studies.leaderboard.families import compare, families_of
+from socialnav_mj.studies.leaderboard.families import compare, families_of, there
 from socialnav_mj.studies.leaderboard.figure import draw_fronts
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
 from socialnav_mj.studies.panel import Entry
@@ -34,8 +34,10 @@ class Leaderboard(Study):
     """Of each controller that learned and has as many, those with the least seeds; others stand with one."""
     settings: tuple[str, ...] = ()
     """Other settings in which the first recording is run, of `SETTINGS`."""
-    setting_draws: int | None = None
-    """Draws in these, the first ones of `draws`; None for all."""
+    setting_controllers: tuple[str, ...] = ()
+    """Those of `controllers` that run in these; all if there are none."""
+    other_draws: int | None = None
+    """Draws on the other recordings and in the other settings, the first ones of `draws`; None for all."""
 
     def __post_init__(self) -> None:
         if not self.recordings or len({recording_name(r) for r in self.recordings}) < len(self.recordings):
@@ -46,8 +48,15 @@ class Leaderboard(Study):
             raise ValueError(f"unknown setting {unknown[0]!r}; available: {', '.join(SETTINGS)}")
         if self.trainings < 1:
             raise ValueError(f"trainings = {self.trainings} is not allowed; allowed: integers >= 1")
-        if self.setting_draws is not None and not 1 <= self.setting_draws <= self.draws:
-            raise ValueError(f"setting_draws = {self.setting_draws} is not allowed; allowed: 1 to draws = {self.draws}")
+        if unknown := [spec for spec in self.setting_controllers if spec not in self.controllers]:
+            raise ValueError(
+                f"setting_controllers has {unknown[0]!r}; allowed: the controllers, {', '.join(self.controllers)}"
+            )
+        if len(set(self.setting_controllers)) != len(self.setting_controllers) or len(self.setting_controllers) == 1:
+            given = self.setting_controllers
+            raise ValueError(f"setting_controllers = {given} is not allowed; allowed: none, or two or more, each once")
+        if self.other_draws is not None and not 1 <= self.other_draws <= self.draws:
+            raise ValueError(f"other_draws = {self.other_draws} is not allowed; allowed: 1 to draws = {self.draws}")
 
     def roster(self, recording: str, setting: str = DEFAULT) -> tuple[Entry, ...]:
         """Who runs on a recording.
@@ -61,7 +70,7 @@ class Leaderboard(Study):
             the setting's turn limit, an entry for each of the first trainings, if there are as many as are asked for.
         """
         entries: list[Entry] = []
-        for spec in self.controllers:
+        for spec in self.controllers if setting == DEFAULT else self.setting_controllers or self.controllers:
             own = with_policy_of(spec, recording_name(recording), SETTINGS[setting].turn_limit)
             trained = [with_training(own, seed) for seed in range(self.trainings)]
             found = [one for one in trained if one is not None]
@@ -82,12 +91,13 @@ class Leaderboard(Study):
 
     def _run(self, recording: str, setting: str) -> Run:
         roster = self.roster(recording, setting)
+        is_first = recording == self.recordings[0] and setting == DEFAULT
         evaluation = Evaluation(
             dataset=recording,
             data_dir=self.data_dir,
             scenarios=self.scenarios,
             controllers=tuple(entry.controller for entry in roster if entry.method != HUMAN),
-            draws=self.draws if setting == DEFAULT else self.setting_draws or self.draws,
+            draws=self.draws if is_first else self.other_draws or self.draws,
             seed=self.seed,
             task_kwargs=dict(SETTINGS[setting].task_kwargs),
         )
@@ -119,7 +129,7 @@ def write_leaderboard(
     families = families_of(study.controllers)
     write_csv(out / "tables" / "leaderboard.csv", [row for board in boards for row in board.rows()])
     write_csv(out / "tables" / "pairs.csv", [row for board in boards for row in board.pair_rows()])
-    compared = [row for board in boards for family in families for row in compare(board, family)]
+    compared = [row for board in boards for family in there(families, board) for row in compare(board, family)]
     write_csv(out / "tables" / "parents.csv", compared)
     draw_fronts(boards, out / "figures")
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
