@@ -1,6 +1,7 @@
 """The leaderboard: ranks of made-up draws, and the command on the smallest crowd."""
 
 import csv
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from agents import rows_of, table_of
 
 from socialnav_mj.cli import main
+from socialnav_mj.episode import Episode
 from socialnav_mj.report import style
+from socialnav_mj.report.blocks import digest_of
 from socialnav_mj.studies.leaderboard.board import board_of
 from socialnav_mj.studies.leaderboard.families import Family, compare, families_of, there, verdict
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
@@ -239,6 +242,7 @@ def test_other_settings_may_have_fewer_controllers_and_their_mixtures_the_parts_
         [board_of_made(), board],
         families=families_of(names),
         costs={},
+        origins=[],
         provenance={"command": "c", "experiment": {}, "recordings": [], "policies": {}, "runs": {}},
     )
     assert "students003, retire on collision" in page and "| students003" in page
@@ -278,6 +282,19 @@ def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
         "0.12",
     ):
         assert text in page
+    rows = [
+        line.split(" | ") for line in page.split("## A row by itself")[1].splitlines() if "socialnav-mj eval" in line
+    ]
+    found = {(row[0].strip("| "), row[1]): (row[2].strip("`"), row[3].strip("| ").split(" / ")) for row in rows}
+    assert len(found) == 4 + 3 and len({tuple(digests) for _, digests in found.values()}) == 4 + 3
+    # The command of a row makes the episodes of that row.
+    line, digests = found["tiny.radii_0.40", "social_force"]
+    main([*shlex.split(line)[1:], "--jobs", "1", "--out", str(tmp_path / "row")])
+    for scenario, digest in zip((1, 4), digests, strict=True):
+        files = sorted((tmp_path / "row" / "episodes").glob(f"scenario_{scenario}.social_force.draw_*.npz"))
+        assert len(files) == 2
+        assert digest_of([Episode.load(path).metadata["state_hash"] for path in files])[:12] == digest
+    assert list((tmp_path / "row").rglob("*.rrd"))
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")}
     main([*command, "--out", str(out)])
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")} == before

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from socialnav_mj.report.intervals import ONE_RECORDING
-from socialnav_mj.report.markdown import interval, number, table
+from socialnav_mj.report.markdown import code, head, interval, marked_row, number, plain, table
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.leaderboard.board import RANKED, Board
 from socialnav_mj.studies.leaderboard.families import Family, compare, there, verdict
 from socialnav_mj.studies.leaderboard.marks import FAIR_SUCCESS, HIGH_SUCCESS
+from socialnav_mj.studies.leaderboard.origins import Origin
 from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 
@@ -42,6 +43,7 @@ def leaderboard_page(
     *,
     families: Sequence[Family],
     costs: Mapping[str, float],
+    origins: Sequence[Origin],
     provenance: Mapping[str, Any],
 ) -> str:
     """Text of the study's README.md.
@@ -50,6 +52,7 @@ def leaderboard_page(
         boards: One for each recording and setting.
         families: Controllers that choose among others.
         costs: CPU time of a controller over that of the physics, by its name on the board.
+        origins: Of all rows.
         provenance: Command, experiment, recordings, runs.
 
     Returns:
@@ -67,6 +70,7 @@ def leaderboard_page(
             heading = SCENARIO_TITLES.get(scenario, scenario)
             lines += [f"### {heading}", "", *_scenario(board, scenario, costs), ""]
     lines += ["## Ranks over recordings and scenarios", "", *_over_all(boards), ""]
+    lines += ["## A row by itself", "", *_origins(origins), ""]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
 
 
@@ -185,6 +189,26 @@ def _set(board: Board, scenario: str, measure: str, place: int) -> str:
     ranks = board.ranks[scenario, measure]
     low, high = int(ranks.lowest[place]), int(ranks.highest[place])
     return f"{low}" if low == high else f"{low}-{high}"
+
+
+def _origins(origins: Sequence[Origin]) -> list[str]:
+    rows = [
+        [
+            plain(origin.run),
+            plain(origin.controller),
+            code(origin.command),
+            " / ".join(digest[:12] for digest in origin.digests),
+        ]
+        for origin in origins
+    ]
+    return [
+        "Each command writes the episodes of its row, a report, and a rerun trace of the first draw of each scenario "
+        "(`socialnav-mj view`). *Hashes*: by scenario, the first digits of the sha256 of the episodes' state hashes, "
+        "which the report says too.",
+        "",
+        *head(["board", "controller", "command", "hashes"]),
+        *(marked_row(cells) for cells in rows),
+    ]
 
 
 def _over_all(boards: Sequence[Board]) -> list[str]:

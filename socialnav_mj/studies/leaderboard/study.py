@@ -14,6 +14,7 @@ from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
 from socialnav_mj.studies.leaderboard.families import compare, families_of, there
 from socialnav_mj.studies.leaderboard.figure import draw_fronts
+from socialnav_mj.studies.leaderboard.origins import origins_of
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
 from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
@@ -133,8 +134,9 @@ def write_leaderboard(
     write_csv(out / "tables" / "parents.csv", compared)
     draw_fronts(boards, out / "figures")
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
+    origins = [origin for run in study.runs() for origin in origins_of(run, results[run.name])]
     provenance = write_provenance(study, results, recordings, out, command=command)
-    page = leaderboard_page(boards, families=families, costs=costs or {}, provenance=provenance)
+    page = leaderboard_page(boards, families=families, costs=costs or {}, origins=origins, provenance=provenance)
     return write_pages(out, page, results, command=command)
 
 
