@@ -5,11 +5,13 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar
 
 from joblib import Parallel, delayed
+from joblib.externals.loky import ProcessPoolExecutor
 
 from socialnav_mj.cluster import active_cluster, calls_on
 
@@ -83,6 +85,32 @@ def in_processes(
             n_jobs=n_jobs, return_as="generator_unordered", initializer=_serve, initargs=(os.getpid(),)
         )(delayed(function)(*own) for own in arguments)
     return results
+
+
+class Beside:
+    """One process for work that goes on beside this one's; it ends within a second of this one, however that ends."""
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
+        self._executor = ProcessPoolExecutor(max_workers=1, initializer=_serve, initargs=(os.getpid(),))
+
+    def ask(self, function: Callable[..., Result], *arguments: object) -> Future[Result]:
+        """Have a function called there, after what was asked before.
+
+        Args:
+            function: To be called; it, the arguments and the result travel between processes.
+            *arguments: Of the call.
+
+        Returns:
+            Its result to come.
+        """
+        with held_back(STOPPING):
+            found: Future[Result] = self._executor.submit(function, *arguments)
+        return found
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        self._executor.shutdown(wait=True, kill_workers=True)
 
 
 @contextmanager

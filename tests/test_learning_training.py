@@ -2,6 +2,7 @@
 
 import json
 import math
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -372,7 +373,8 @@ def test_training_of_500_steps_writes_a_policy_that_acts(killed_and_resumed):
 def test_kill_loses_at_most_one_checkpoint(killed_and_resumed):
     """130 steps are lost, the 200 before are not."""
     _, first, second, _ = killed_and_resumed
-    assert first == list(range(331)) and second == list(range(200, 501))
+    # Of a step in which a validation ends that was waited for there are two reports.
+    assert list(dict.fromkeys(first)) == list(range(331)) and list(dict.fromkeys(second)) == list(range(200, 501))
 
 
 def test_what_a_kill_leaves_is_the_checkpoint_as_it_was(killed_and_resumed, tmp_path):
@@ -412,11 +414,21 @@ def test_last_late_checkpoint_within_a_standard_error_of_the_best_is_kept(tmp_pa
     """Of 100 agents 0.9 +- 0.03 arrive at best; 0.88 is within that, 0.86 is not, and 0.99 came early."""
     success = iter([0.99, 0.3, 0.9, 0.88, 0.86])
 
-    def validation(path, recordings, *, part, shares, turn_limit):
-        value = next(success) if path.name == "latest.safetensors" else 0.0
-        return {"success": value, "intrusion_share": 0.2, "time_under_way": 5.0, "n_agents": 100.0}
+    class Here:
+        """In the place of another process."""
 
-    monkeypatch.setattr("socialnav_mj.learning.training.validate", validation)
+        def ask(self, function, path, *others):
+            value = next(success) if path.name == "latest.safetensors" else 0.0
+            found = Future()
+            found.set_result(
+                ({"success": value, "intrusion_share": 0.2, "time_under_way": 5.0, "n_agents": 100.0}, 0.0)
+            )
+            return found
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr("socialnav_mj.learning.training.Beside", Here)
     card = load_policy(str(train(small(scene_steps=50, checkpoint_every=10, kept_from=0.6), tmp_path))).card
     assert card["scene_steps"] == 40 and card["score"] == pytest.approx(0.78)
     assert [entry["success"] for entry in card["history"]] == [0.99, 0.3, 0.9, 0.88, 0.86]

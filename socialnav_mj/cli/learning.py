@@ -150,8 +150,8 @@ def _run_here(
             if step.validation is not None:
                 v = step.validation
                 say(
-                    f"{step.scene_steps} scene steps, {step.transitions} transitions: validation success "
-                    f"{v['success']:.3f}, share of steps within 1.2 m {v['intrusion_share']:.3f}",
+                    f"{step.validated} scene steps: validation success {v['success']:.3f}, "
+                    f"share of steps within 1.2 m {v['intrusion_share']:.3f}",
                     progress.console,
                 )
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -22,7 +23,8 @@ from socialnav_mj.learning.attention import AttentionExtractor, AttentionPPO
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.folder import CHECKPOINT, HISTORY, PACKAGES, Progress, claim, complete_card
 from socialnav_mj.learning.shipping import ATTENTION, BEST
-from socialnav_mj.learning.validation import validate
+from socialnav_mj.learning.validation import judge
+from socialnav_mj.processes import Beside
 from socialnav_mj.provenance import package_versions, recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
 from socialnav_mj.recordings.window import window
@@ -78,7 +80,8 @@ def train_attention(
     left = config.scene_steps - model.scene_steps
     if left > 0:
         model.learn(left * model.n_envs, callback=run, reset_num_timesteps=False, log_interval=1)
-    complete_card(folder / BEST, config, recordings, run.history, controller=Attention)
+    with closing(Beside()) as beside:
+        complete_card(folder / BEST, config, recordings, run.history, beside, controller=Attention)
     return folder / BEST
 
 
@@ -127,8 +130,10 @@ class _Run(BaseCallback):
 
     def tell(self, model: AttentionPPO, validation: dict[str, float] | None) -> None:
         if self._report is not None:
-            steps = Progress(scene_steps=model.scene_steps, transitions=self.transitions, validation=validation)
-            self._report(steps)
+            done = model.scene_steps
+            self._report(
+                Progress(scene_steps=done, transitions=self.transitions, validation=validation, validated=done)
+            )
 
     def _on_step(self) -> bool:
         self.transitions += sum(info["active"] for info in self.locals["infos"])
@@ -178,14 +183,7 @@ class _Run(BaseCallback):
             "versions": package_versions(PACKAGES),
         }
         save_attention(model, latest, card)
-        found = validate(
-            latest,
-            self._recordings,
-            part=config.validation_window,
-            shares=config.validation_shares,
-            turn_limit=config.turn_limit,
-            controller=Attention,
-        )
+        found, _ = judge(latest, self._recordings, config, config.validation_window, Attention)
         score = found["success"] - config.intrusion_weight * found["intrusion_share"]
         if score >= max((entry["score"] for entry in self.history), default=score):
             save_attention(model, self._folder / BEST, {**card, "score": score})

@@ -11,7 +11,8 @@ from socialnav_mj.controllers.replay_irl import ReplayIRL
 from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
-from socialnav_mj.learning.validation import validate
+from socialnav_mj.learning.validation import judge
+from socialnav_mj.processes import Beside
 from socialnav_mj.recordings import Recording
 
 PACKAGES = ("socialnav-mj", "mujoco", "dm-control", "numpy", "torch", "stable-baselines3")
@@ -27,7 +28,9 @@ class Progress:
     transitions: int
     """In the shared buffer, or seen."""
     validation: dict[str, float] | None
-    """Of the checkpoint just written, if there was one."""
+    """That has just ended, if there is one."""
+    validated: int = 0
+    """Scene steps of the policy that it is of."""
 
 
 def claim(folder: Path, config: Mapping[str, Any]) -> None:
@@ -59,6 +62,7 @@ def complete_card(
     config: TrainingConfig | AttentionConfig,
     recordings: list[Recording],
     history: Sequence[Mapping[str, Any]],
+    beside: Beside,
     *,
     controller: Callable[..., Controller] = ReplayIRL,
 ) -> None:
@@ -69,6 +73,7 @@ def complete_card(
         config: Of the training.
         recordings: Whole recordings.
         history: Of the checkpoints.
+        beside: Another process, which takes the part that was trained on, while this one takes the others.
         controller: Drives the policy.
     """
     card_path = path.with_suffix(".json")
@@ -76,19 +81,9 @@ def complete_card(
     if "metrics" in card:
         return
     parts = {"in_sample": config.train_window, "validation": config.validation_window, "held_out": config.test_window}
-    card["metrics"] = {
-        name: {
-            "window": part,
-            **validate(
-                path,
-                recordings,
-                part=part,
-                shares=config.validation_shares,
-                turn_limit=config.turn_limit,
-                controller=controller,
-            ),
-        }
-        for name, part in parts.items()
-    }
+    asked = beside.ask(judge, path, recordings, config, parts["in_sample"], controller)
+    found = {name: judge(path, recordings, config, parts[name], controller)[0] for name in ("validation", "held_out")}
+    found["in_sample"] = asked.result()[0]
+    card["metrics"] = {name: {"window": part, **found[name]} for name, part in parts.items()}
     card["history"] = history
     write_json(card_path, card)

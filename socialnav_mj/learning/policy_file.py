@@ -1,6 +1,7 @@
 """Trained weights as safetensors with a JSON card."""
 
 import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,19 @@ def save_policy(model: ReplayIRL, path: Path, card: dict[str, Any]) -> None:
     content = save(tensors)
     write_whole(path, content)
     write_json(path.with_suffix(".json"), {**card, "sha256": hashlib.sha256(content).hexdigest()})
+
+
+def copy_policy(path: Path, target: Path, facts: dict[str, Any]) -> None:
+    """Copy weights with their card.
+
+    Args:
+        path: Of the .safetensors file.
+        target: The copy.
+        facts: JSON values that its card has besides.
+    """
+    card = json.loads(path.with_suffix(".json").read_text())
+    write_whole(target, path.read_bytes())
+    write_json(target.with_suffix(".json"), {**card, **facts})
 
 
 def _linear_layers(network: str, modules: list[nn.Module]) -> dict[str, Tensor]:

@@ -3,15 +3,18 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from socialnav_mj import metrics
 from socialnav_mj.config import Scenario, TurnLimit
 from socialnav_mj.controllers import Controller
 from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
 from socialnav_mj.environment import build_environment
+from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
 from socialnav_mj.recordings import Recording
 from socialnav_mj.recordings.window import window
@@ -59,6 +62,38 @@ def validate(
         "time_under_way": float(np.nanmean(time)),
         "n_agents": float(len(success)),
     }
+
+
+def judge(
+    policy_path: Path,
+    recordings: list[Recording],
+    config: TrainingConfig | AttentionConfig,
+    part: tuple[float, float],
+    controller: Callable[..., Controller] = Policy,
+) -> tuple[dict[str, float], float]:
+    """Validate a policy of a training, in whatever process, on one thread.
+
+    Args:
+        policy_path: Of the weights.
+        recordings: Whole recordings.
+        config: Of the training.
+        part: Window, as shares of their duration.
+        controller: Drives the policy.
+
+    Returns:
+        What `validate` returns, and the time that it took [s].
+    """
+    threadpool_limits(1)  # of numpy's products
+    begin = perf_counter()
+    found = validate(
+        policy_path,
+        recordings,
+        part=part,
+        shares=config.validation_shares,
+        turn_limit=config.turn_limit,
+        controller=controller,
+    )
+    return found, perf_counter() - begin
 
 
 def is_kept(entry: Mapping[str, Any], history: Sequence[Mapping[str, Any]], config: TrainingConfig) -> bool:
