@@ -13,7 +13,7 @@ from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.leaderboard.board import RANKED, Board
 from socialnav_mj.studies.leaderboard.families import Family, compare, there, verdict
 from socialnav_mj.studies.leaderboard.marks import FAIR_SUCCESS, HIGH_SUCCESS
-from socialnav_mj.studies.leaderboard.origins import Origin
+from socialnav_mj.studies.leaderboard.row_origins import RowOrigin
 from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 
@@ -43,7 +43,7 @@ def leaderboard_page(
     *,
     families: Sequence[Family],
     costs: Mapping[str, float],
-    origins: Sequence[Origin],
+    origins: Sequence[RowOrigin],
     provenance: Mapping[str, Any],
 ) -> str:
     """Text of the study's README.md.
@@ -191,7 +191,7 @@ def _set(board: Board, scenario: str, measure: str, place: int) -> str:
     return f"{low}" if low == high else f"{low}-{high}"
 
 
-def _origins(origins: Sequence[Origin]) -> list[str]:
+def _origins(origins: Sequence[RowOrigin]) -> list[str]:
     rows = [
         [
             plain(origin.run),

@@ -14,8 +14,8 @@ from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
 from socialnav_mj.studies.leaderboard.families import compare, families_of, there
 from socialnav_mj.studies.leaderboard.figure import draw_fronts
-from socialnav_mj.studies.leaderboard.origins import origins_of
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
+from socialnav_mj.studies.leaderboard.row_origins import origins_of
 from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 from socialnav_mj.studies.study import CONTROLLERS, Run, Study, read_runs

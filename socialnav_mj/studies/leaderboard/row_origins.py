@@ -10,7 +10,7 @@ from socialnav_mj.studies.study import Run
 
 
 @dataclass(frozen=True, kw_only=True)
-class Origin:
+class RowOrigin:
     """Of one row."""
 
     run: str
@@ -23,7 +23,7 @@ class Origin:
     """Of its episodes in each scenario, as `blocks.digest_of`, which the reports of runs show too."""
 
 
-def origins_of(run: Run, results: Results) -> list[Origin]:
+def origins_of(run: Run, results: Results) -> list[RowOrigin]:
     """Where the rows of a run come from.
 
     Args:
@@ -37,7 +37,7 @@ def origins_of(run: Run, results: Results) -> list[Origin]:
     for entry in run.roster:
         specs.setdefault(entry.method, []).append(entry.controller)
     return [
-        Origin(
+        RowOrigin(
             run=run.name,
             controller=method,
             command=_command(run, [spec for spec in own if spec in run.evaluation.controllers]),
