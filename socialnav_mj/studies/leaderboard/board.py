@@ -13,7 +13,7 @@ from socialnav_mj.studies.leaderboard.marks import Mark, marks_of
 from socialnav_mj.studies.leaderboard.ranks import Ranks, rank
 from socialnav_mj.studies.levels import LevelTable, levels
 from socialnav_mj.studies.panel import Entry, Panel, Term, make_panel
-from socialnav_mj.studies.settings import DEFAULT
+from socialnav_mj.studies.settings import DEFAULT, SETTINGS
 
 RANKED = {"success": True, "intrusion_share_of_steps": False, "time_under_way": False}
 """Measure: whether more is better."""
@@ -48,6 +48,11 @@ class Board:
     """Scenario and measure of `RANKED`: ranks in the order of the controllers."""
     marks: tuple[Mark, ...]
     """See `marks.marks_of`."""
+
+    @property
+    def title(self) -> str:
+        """What it is called: recording, and setting if it is not the default one."""
+        return self.recording if self.setting == DEFAULT else f"{self.recording}, {SETTINGS[self.setting].title}"
 
     @property
     def scenarios(self) -> tuple[str, ...]:

@@ -1,6 +1,5 @@
 """Success against nearness to people and against time: who is on the front."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,20 +25,20 @@ _SUCCESSES = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
 _TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 5, 7, 10, 12, 15, 20, 30, 50)
 
 
-def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
-    """The first recording's scenarios side by side, success over both other measures; numbers name the controllers.
+def draw_fronts(board: Board, folder: Path, name: str) -> list[Path]:
+    """A recording's scenarios side by side, success over both other measures; numbers name the controllers.
 
     Intervals of success are drawn in the upper row only, the human row's success is dotted, and the front is dashed.
     Success is on a logit scale: .98 is as far from .96 as .5 from .34, since the odds are halved.
 
     Args:
-        boards: One for each recording; the first is drawn.
+        board: Of the recording.
         folder: Gets a PNG and an SVG.
+        name: Of these.
 
     Returns:
         Paths of the files.
     """
-    board = boards[0]
     with style():
         figure = new_figure(1.6 + 2.6 * len(_AXES))
         grid = figure.subplots(len(_AXES), len(board.scenarios), sharey=True, squeeze=False)
@@ -51,13 +50,13 @@ def draw_fronts(boards: Sequence[Board], folder: Path) -> list[Path]:
             row[0].set_xlabel(label, loc="left")
             row[0].set_ylabel("share of agents that succeed, logit scale")
         handles, labels = grid[0][0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4, title=board.recording)
+        figure.legend(handles, labels, loc="outside upper center", ncols=4, title=board.title)
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # places are settled: what is written beside the points stays there
         for (measure, _), row in zip(_AXES, grid, strict=True):
             for scenario, axes in zip(board.scenarios, row, strict=True):
                 _number(axes, board, scenario, measure)
-        return save(figure, folder, "fronts")
+        return save(figure, folder, name)
 
 
 def _draw(axes: Axes, board: Board, scenario: str, measure: str, *, with_intervals: bool) -> None:

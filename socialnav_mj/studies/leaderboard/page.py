@@ -15,7 +15,7 @@ from socialnav_mj.studies.leaderboard.families import Family, compare, there, ve
 from socialnav_mj.studies.leaderboard.marks import FAIR_SUCCESS, HIGH_SUCCESS
 from socialnav_mj.studies.leaderboard.row_origins import RowOrigin
 from socialnav_mj.studies.looks import SCENARIO_TITLES
-from socialnav_mj.studies.settings import DEFAULT, SETTINGS
+from socialnav_mj.studies.settings import DEFAULT
 
 _FIGURE = (
     "Success on a logit scale, on which equal distances are equal ratios of the odds; bars: its 95 % intervals; "
@@ -59,19 +59,35 @@ def leaderboard_page(
         Markdown.
     """
     lines = ["# Leaderboard", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ, *_counted(boards), ""]
-    lines += ["![fronts](figures/fronts.png)", "", _FIGURE, ""]
+    lines += [_picture(boards[0]), "", _FIGURE, ""]
     if any(board.marks for board in boards):
         lines += ["## Marks", "", *_marks(boards), ""]
     if families:
         lines += ["## Is a mixture better than its best part?", "", *_families(boards, families), ""]
     for board in boards:
-        lines += [f"## {_title(board)}", ""]
+        lines += [f"## {board.title}", "", *([] if board is boards[0] else [_picture(board), ""])]
         for scenario in board.scenarios:
             heading = SCENARIO_TITLES.get(scenario, scenario)
             lines += [f"### {heading}", "", *_scenario(board, scenario, costs), ""]
     lines += ["## Ranks over recordings and scenarios", "", *_over_all(boards), ""]
     lines += ["## A row by itself", "", *_origins(origins), ""]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
+
+
+def figure_of(board: Board) -> str:
+    """Name of the figure of a board, without folder and ending.
+
+    Args:
+        board: The board.
+
+    Returns:
+        After its recording and setting.
+    """
+    return f"fronts_{board.recording}" + ("" if board.setting == DEFAULT else f"_{board.setting}")
+
+
+def _picture(board: Board) -> str:
+    return f"![fronts of {board.title}](figures/{figure_of(board)}.png)"
 
 
 def _counted(boards: Sequence[Board]) -> list[str]:
@@ -81,17 +97,13 @@ def _counted(boards: Sequence[Board]) -> list[str]:
         own = [level for level in board.table.rows if level.measure == "success"]
         several = {level.method: level.interval.n_trainings for level in own if level.interval.n_trainings > 1}
         draws = max(level.interval.n_draws for level in own)
-        rows.append([_title(board), str(draws), ", ".join(f"{name}: {n}" for name, n in several.items()) or "-"])
+        rows.append([board.title, str(draws), ", ".join(f"{name}: {n}" for name, n in several.items()) or "-"])
     return [
         *table(["board", "draws", "several trainings"], rows),
         "",
         "What is said of controllers with several trainings is said of other trainings too; of others, of the one "
         "that ran.",
     ]
-
-
-def _title(board: Board) -> str:
-    return board.recording if board.setting == DEFAULT else f"{board.recording}, {SETTINGS[board.setting].title}"
 
 
 def _marks(boards: Sequence[Board]) -> list[str]:
@@ -118,7 +130,7 @@ def _marks(boards: Sequence[Board]) -> list[str]:
                 ]
             )
         heads = ["controller", "marks", "success", "steps - ReplayIRL's", "time - potential field's [s]"]
-        lines += [f"{_title(board)}:", "", *table(heads, rows), ""] if rows else []
+        lines += [f"{board.title}:", "", *table(heads, rows), ""] if rows else []
     return lines
 
 
@@ -137,7 +149,7 @@ def _families(boards: Sequence[Board], families: Sequence[Family]) -> list[str]:
                 ]
                 rows.append([family.child, parent, *cells, verdicts])
         heads = ["controller", "part", "success", "share of steps", "verdict by scenario"]
-        lines += [f"{_title(board)}:", "", *table(heads, rows), ""] if rows else []
+        lines += [f"{board.title}:", "", *table(heads, rows), ""] if rows else []
     missing = {name: family.child for family in families for name in family.missing}
     lines += [f"Not on the board: {name}, a part of {child}." for name, child in missing.items()]
     return lines

@@ -14,7 +14,7 @@ from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.leaderboard.board import Board, board_of
 from socialnav_mj.studies.leaderboard.families import compare, families_of, there
 from socialnav_mj.studies.leaderboard.figure import draw_fronts
-from socialnav_mj.studies.leaderboard.page import leaderboard_page
+from socialnav_mj.studies.leaderboard.page import figure_of, leaderboard_page
 from socialnav_mj.studies.leaderboard.row_origins import origins_of
 from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
@@ -132,7 +132,8 @@ def write_leaderboard(
     write_csv(out / "tables" / "pairs.csv", [row for board in boards for row in board.pair_rows()])
     compared = [row for board in boards for family in there(families, board) for row in compare(board, family)]
     write_csv(out / "tables" / "parents.csv", compared)
-    draw_fronts(boards, out / "figures")
+    for board in boards:
+        draw_fronts(board, out / "figures", figure_of(board))
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     origins = [origin for run in study.runs() for origin in origins_of(run, results[run.name])]
     provenance = write_provenance(study, results, recordings, out, command=command)
