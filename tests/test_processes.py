@@ -2,10 +2,11 @@
 
 import os
 import signal
+import time
 
 import pytest
 
-from socialnav_mj.processes import STOPPING, Interruption, in_processes, stoppable
+from socialnav_mj.processes import STOPPING, Beside, Interruption, in_processes, stoppable
 
 
 def square(number):
@@ -70,3 +71,20 @@ def test_signal_that_is_to_be_ignored_stays_ignored():
             os.kill(os.getpid(), signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_process_beside_this_one_answers_in_turn_and_ends_whatever_it_does():
+    beside = Beside()
+    numbers = [beside.ask(os.getpid).result() for _ in range(2)]
+    assert numbers[0] == numbers[1] != os.getpid()
+    with pytest.raises(ValueError, match="invalid literal"):
+        beside.ask(int, "x").result()
+    endless = beside.ask(time.sleep, 60.0)
+    while not endless.running():
+        time.sleep(0.01)
+    time.sleep(0.2)
+    begin = time.monotonic()
+    beside.close()
+    assert time.monotonic() - begin < 30.0
+    with pytest.raises(ProcessLookupError):
+        os.kill(numbers[0], 0)
