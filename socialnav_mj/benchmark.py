@@ -49,6 +49,8 @@ class Cost:
     """The least of them."""
     ratio_high: float
     """The greatest."""
+    parked_ratio: float
+    """Bare `mj_step` calls of the scene as it was built, robots parked in it, over physics_cpu; the median."""
     real_time_factor: float
     """simulated_time / episode_cpu."""
     save_share: float
@@ -79,10 +81,11 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
 
     setting = Scenario(share=SHARES[scenario], seed=seed)
     environment = build_environment(recording, setting, robots="likely")
-    n_used = max(state["n_used"] for state in _record_states(environment, controller))
+    whole_states = _record_states(environment, controller)
+    n_used = max(state["n_used"] for state in whole_states)
     bare = build_environment(recording, setting, robots=n_used)
     states = _record_states(bare, controller)
-    episode_times, physics_times, save_times, trace_times = [], [], [], []
+    episode_times, physics_times, whole_times, save_times, trace_times = [], [], [], [], []
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "trace.rrd"
         write_trace(rollout(environment, make_controller(controller)), trace)  # warms everything up
@@ -91,6 +94,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
             episode = rollout(environment, make_controller(controller), scenario_name=scenario)
             episode_times.append(process_time() - begin)
             physics_times.append(_time_bare_steps(bare, states))
+            whole_times.append(_time_bare_steps(environment, whole_states))
             begin = process_time()
             episode.save(Path(folder) / "episode.npz")
             save_times.append(process_time() - begin)
@@ -113,6 +117,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
         ratio=median(ratios),
         ratio_low=min(ratios),
         ratio_high=max(ratios),
+        parked_ratio=median(w / p for w, p in zip(whole_times, physics_times, strict=True)),
         real_time_factor=float(episode.time[-1]) / median(episode_times),
         save_share=median(s / e for s, e in zip(save_times, episode_times, strict=True)),
         trace_share=median(t / e for t, e in zip(trace_times, episode_times, strict=True)),

@@ -540,6 +540,7 @@ def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
     (cost,) = content["costs"]
     assert cost["scenario"] == "scenario_4" and cost["n_agents"] == 3
     assert cost["ratio_low"] <= cost["ratio"] <= cost["ratio_high"]
+    assert "as built, with parked / mj_step" in output and cost["parked_ratio"] > 0.0
     assert cost["real_time_factor"] == pytest.approx(cost["simulated_time"] / cost["episode_cpu"])
     assert content["recording"]["name"] == "tiny" and "mujoco" in content["versions"]
 

@@ -245,6 +245,7 @@ class Bench:
                 "bare mj_step CPU [s]": f"{cost.physics_cpu:.2f}",
                 "episode / mj_step": f"{cost.ratio:.2f} ({cost.ratio_low:.2f} to {cost.ratio_high:.2f})",
                 "real-time factor": f"{cost.real_time_factor:.1f}",
+                "as built, with parked / mj_step": f"{cost.parked_ratio:.2f}",
                 "saving / episode": f"{cost.save_share:.1%}",
                 "trace / episode": f"{cost.trace_share:.1%}",
                 "trace [MB]": f"{cost.trace_megabytes:.2f}",
