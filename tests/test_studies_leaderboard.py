@@ -15,7 +15,7 @@ from socialnav_mj.report.blocks import digest_of
 from socialnav_mj.studies.leaderboard.board import board_of
 from socialnav_mj.studies.leaderboard.families import Family, compare, families_of, there, verdict
 from socialnav_mj.studies.leaderboard.page import leaderboard_page
-from socialnav_mj.studies.leaderboard.ranks import rank
+from socialnav_mj.studies.leaderboard.ranks import critical, rank
 from socialnav_mj.studies.leaderboard.study import Leaderboard
 from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.study import CONTROLLERS
@@ -56,12 +56,29 @@ def test_two_draws_rank_nobody():
     assert ranks.lowest.tolist() == [1, 1] and ranks.highest.tolist() == [2, 2]
 
 
-def test_rank_sets_of_all_equal_controllers_leave_nobody_out_in_nineteen_of_twenty_studies():
-    """Eight equal controllers, 20 draws: no pair is told apart but in 5 % of studies; 200 studies, 0.05 +- 0.015."""
+@pytest.mark.parametrize("n_draws", [3, 5, 20])
+def test_rank_sets_of_all_equal_controllers_leave_nobody_out_in_nineteen_of_twenty_studies(n_draws):
+    """Eight equal controllers: no pair is told apart but in 5 % of studies; 200 studies, 0.05 +- 0.015."""
     told_apart = [
-        rank(draws_of([0.5] * 8, spread=0.05, seed=seed), more_is_better=True).better.any() for seed in range(200)
+        rank(draws_of([0.5] * 8, n_draws=n_draws, spread=0.05, seed=seed), more_is_better=True).better.any()
+        for seed in range(200)
     ]
     assert np.mean(told_apart) < 0.1
+    # Shares of 43 agents are not normal, and often the same.
+    shares = [np.random.default_rng(seed).binomial(43, 0.97, (n_draws, 1, 8)) / 43 for seed in range(200)]
+    assert np.mean([rank(cells, more_is_better=True).better.any() for cells in shares]) < 0.1
+
+
+def test_the_largest_of_one_pairs_t_is_students():
+    """Two controllers have one pair: the two-sided 95 % quantile of t with 4 and 19 degrees of freedom."""
+    assert critical(5, 2) == pytest.approx(2.776, rel=0.05) and critical(20, 2) == pytest.approx(2.093, rel=0.05)
+    # Of three alike with many draws it is Tukey's, 3.314 / sqrt(2).
+    assert critical(400, 3) == pytest.approx(2.344, rel=0.05)
+
+
+def test_a_difference_that_is_the_same_in_every_draw_tells_nobody_apart():
+    cells = np.repeat([[[0.5, 0.6]]], 5, axis=0)
+    assert not rank(cells, more_is_better=True).better.any()
 
 
 def test_trainings_that_differ_leave_controllers_tied_that_one_training_tells_apart():
@@ -83,6 +100,11 @@ def test_controller_with_fewer_trainings_is_compared_by_those_that_it_has():
     assert ranks.lowest.tolist() == ranks.highest.tolist() == [1, 2]
 
 
+def luck_of(name, n_draws):
+    """0 in half of the draws and 1 in the others, in an order of the controller's own."""
+    return np.random.default_rng(len(name)).permutation(n_draws) % 2
+
+
 def rows_for(levels, *, n_draws=10):
     """Agents of made-up controllers: {name: (share that succeeds, steps within 1.2 m, time)}; draws differ a little."""
     return [
@@ -94,10 +116,10 @@ def rows_for(levels, *, n_draws=10):
             "scenario_1",
             draw,
             {
-                "success": [k < 100 * success - draw % 2 for k in range(100)],
-                "intimate_intrusions": [steps + draw * len(name) % 4] * 100,
+                "success": [k < 100 * success - luck_of(name, n_draws)[draw] for k in range(100)],
+                "intimate_intrusions": [steps + luck_of(name, n_draws)[draw]] * 100,
                 "active_steps": 100,
-                "intrusion_share": steps / 100.0,
+                "intrusion_share": (steps + luck_of(name, n_draws)[draw]) / 100.0,
                 "time_under_way": time + 0.1 * (draw * len(name) % 5),
             },
         )
