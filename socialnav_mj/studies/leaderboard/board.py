@@ -133,7 +133,7 @@ class Board:
         return rows
 
     def pair_rows(self) -> list[dict[str, Any]]:
-        """Every pair of controllers as rows of a table."""
+        """Every pair of controllers, once, as rows of a table; verdict as in `families.compare`."""
         return [
             {
                 "recording": self.recording,
@@ -143,13 +143,13 @@ class Board:
                 "controller": one,
                 "other": other,
                 "difference": self.mean(scenario, i, measure) - self.mean(scenario, j, measure),
-                "distinguishably_better": int(ranks.better[i, j]),
+                "verdict": int(ranks.better[i, j]) - int(ranks.better[j, i]),
                 "probability_of_improvement": ranks.improvement[i, j],
             }
             for (scenario, measure), ranks in self.ranks.items()
             for i, one in enumerate(self.controllers)
             for j, other in enumerate(self.controllers)
-            if i != j
+            if i < j
         ]
 
 
