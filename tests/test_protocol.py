@@ -12,7 +12,13 @@ from socialnav_mj.geometry import twist_of_wheel_speed
 from socialnav_mj.observation import observe
 
 LIMITS = Limits.of(Scenario())
-SPECS = (*BUILT_IN, "mpc(preset='calm')", "mpc(preset='free')", "mpc(prediction='constant_velocity')")
+SPECS = (
+    *BUILT_IN,
+    "mpc(preset='calm')",
+    "mpc(preset='brisk')",
+    "mpc(preset='free')",
+    "mpc(prediction='constant_velocity')",
+)
 every_controller = pytest.mark.parametrize("spec", SPECS)
 
 

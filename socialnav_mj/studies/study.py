@@ -11,7 +11,10 @@ from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, eval
 from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.studies.panel import Entry
 
-CONTROLLERS = (*(name for name in BUILT_IN if name != "stand_still"), "mpc(preset='calm')", "mpc(preset='free')")
+CONTROLLERS = (
+    *(name for name in BUILT_IN if name != "stand_still"),
+    *(f"mpc(preset={name!r})" for name in ("calm", "brisk", "free")),
+)
 """All built-in ones but the one that goes nowhere, and the planner's other presets."""
 
 

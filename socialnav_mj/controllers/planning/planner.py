@@ -10,11 +10,12 @@ from socialnav_mj.controllers.planning.foresight import Ahead, Foresight
 from socialnav_mj.controllers.planning.terms import Crowd, Terms, terms_of
 from socialnav_mj.controllers.prediction import Prediction, load_prediction
 
-Preset = Literal["social", "free", "calm"]
+Preset = Literal["social", "brisk", "free", "calm"]
 
 WEIGHTS = ("person", "agent", "zone", "entrance")
 PRESETS: dict[str, tuple[float, float, float, float]] = {
     "social": (6.0, 6.0, 0.35, 25.0),
+    "brisk": (6.0, 6.0, 0.15, 25.0),
     "free": (6.0, 6.0, 0.0, 25.0),
     "calm": (8.0, 6.0, 1.0, 25.0),
 }
@@ -33,7 +34,7 @@ class Planner(TwistController):
     """
 
     preset: Preset = "social"
-    """Weights that are not given are this preset's: "social", "free" (no zone) or "calm" (a dear one)."""
+    """Weights that are not given are this preset's: "social", "brisk" (a cheaper zone), "free" (none) or "calm" (a dear one)."""
     person_weight: float | None = None
     """Cost of touching a person now, >= 0 [s]."""
     agent_weight: float | None = None
