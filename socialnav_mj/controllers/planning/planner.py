@@ -34,7 +34,7 @@ class Planner(TwistController):
     """
 
     preset: Preset = "social"
-    """Weights that are not given are this preset's: "social", "brisk" (a cheaper zone), "free" (none) or "calm" (a dear one)."""
+    """Weights that are not given are this preset's; "brisk" has a cheaper zone, "calm" a dear one, "free" none."""
     person_weight: float | None = None
     """Cost of touching a person now, >= 0 [s]."""
     agent_weight: float | None = None
