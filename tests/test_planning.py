@@ -318,7 +318,7 @@ def test_foresight_expects_agents_to_keep_their_velocity_and_people_to_go_on_cha
 @pytest.mark.parametrize(
     ("kwargs", "named"),
     [
-        ({"preset": "wild"}, "preset = 'wild' is not allowed; allowed: social, free, calm"),
+        ({"preset": "wild"}, "preset = 'wild' is not allowed; allowed: social, brisk, free, calm"),
         ({"zone_weight": -1.0}, "zone_weight = -1.0 is not allowed; allowed: numbers >= 0"),
         ({"person_weight": float("nan")}, "person_weight = nan"),
         ({"prediction": "oracle"}, "there is no prediction 'oracle'; available: constant_velocity, linear"),
