@@ -295,6 +295,13 @@ def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
     ranked = [row for row in rows if row["measure"] == "success" and row["controller"] != "human"]
     assert len(ranked) == 2 * (3 + 2)
     assert all(1 <= int(row["lowest_rank"]) <= int(row["highest_rank"]) <= 3 for row in ranked)
+    assert all(float(row["rank_at_most_1"]) <= float(row["rank_at_most_3"]) <= 1.0 for row in ranked)
+    assert {float(row["rank_at_most_3"]) for row in ranked} == {1.0}
+    successes = [row for row in rows if row["measure"] == "success"]
+    people = {(row["setting"], row["scenario"]): row for row in successes if row["controller"] == "human"}
+    for row in ranked:
+        own = float(row["mean"]) - float(people[row["setting"], row["scenario"]]["mean"])
+        assert float(row["minus_human"]) == pytest.approx(own, abs=1e-5)
     page = (public / "README.md").read_text()
     for text in (
         "scenario 4: 90 % agents",

@@ -32,6 +32,8 @@ MEASURES = (
     "largest_impact_impulse",
 )
 """What is told of every controller."""
+AT_MOST = (1, 3, 5)
+"""Ranks k for which tables have the share of resampled studies with a rank of at most k."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,23 +115,27 @@ class Board:
                         continue
                     ranks = self.ranks.get((scenario, measure)) if method != HUMAN else None
                     place = self.controllers.index(method) if ranks is not None else 0
-                    rows.append(
-                        {
-                            "recording": self.recording,
-                            "setting": self.setting,
-                            "scenario": scenario,
-                            "controller": method,
-                            "measure": measure,
-                            "mean": level.interval.mean,
-                            "low": level.interval.low,
-                            "high": level.interval.high,
-                            "n_draws": level.interval.n_draws,
-                            "n_trainings": level.interval.n_trainings,
-                            "n_values": level.n_values,
-                            "lowest_rank": "" if ranks is None else int(ranks.lowest[place]),
-                            "highest_rank": "" if ranks is None else int(ranks.highest[place]),
-                        }
-                    )
+                    human = self.table.find(scenario, HUMAN, measure)
+                    row: dict[str, Any] = {
+                        "recording": self.recording,
+                        "setting": self.setting,
+                        "scenario": scenario,
+                        "controller": method,
+                        "measure": measure,
+                        "mean": level.interval.mean,
+                        "low": level.interval.low,
+                        "high": level.interval.high,
+                        "minus_human": float("nan") if human is None else level.interval.mean - human.interval.mean,
+                        "n_draws": level.interval.n_draws,
+                        "n_trainings": level.interval.n_trainings,
+                        "n_values": level.n_values,
+                        "lowest_rank": "" if ranks is None else int(ranks.lowest[place]),
+                        "highest_rank": "" if ranks is None else int(ranks.highest[place]),
+                    }
+                    for k in AT_MOST:
+                        at_most = "" if ranks is None else ranks.at_most[place, min(k, len(self.controllers)) - 1]
+                        row[f"rank_at_most_{k}"] = at_most
+                    rows.append(row)
         return rows
 
     def pair_rows(self) -> list[dict[str, Any]]:

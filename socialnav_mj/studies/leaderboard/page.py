@@ -28,6 +28,8 @@ tied, whatever their means. There is no single score: success, nearness to peopl
 **bold** name is on the front of success and nearness: nobody has more success and fewer steps within 1.2 m at once. \
 *Hits on people* are counted for 100 agents, by who moved into whom: the agent alone, both, the person alone. \
 *Impact*: momentum of an agent's hardest collision. *Cost*: CPU time for an agent and step over that of the physics. \
+tables/leaderboard.csv has the distance to the recorded people as well, and how often each has a rank of at most 1, \
+3 or 5 in resampled draws; tables/pairs.csv the probability of improvement of each pair. \
 {ONE_RECORDING} Each recording is a task of its own; the last \
 table says how ranks differ between them, which is all that is known of a recording that is not here.
 """
