@@ -150,7 +150,7 @@ def _run_here(
             if step.validation is not None:
                 v = step.validation
                 say(
-                    f"{step.validated} scene steps: validation success {v['success']:.3f}, "
+                    f"{v['scene_steps']} scene steps: validation success {v['success']:.3f}, "
                     f"share of steps within 1.2 m {v['intrusion_share']:.3f}",
                     progress.console,
                 )

@@ -23,7 +23,7 @@ from socialnav_mj.learning.attention import AttentionExtractor, AttentionPPO
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.folder import CHECKPOINT, HISTORY, PACKAGES, Progress, claim, complete_card
 from socialnav_mj.learning.shipping import ATTENTION, BEST
-from socialnav_mj.learning.validation import judge
+from socialnav_mj.learning.validation import validate
 from socialnav_mj.processes import Beside
 from socialnav_mj.provenance import package_versions, recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
@@ -128,12 +128,10 @@ class _Run(BaseCallback):
         self.transitions, self.imitation_error, self.seconds = 0, 0.0, 0.0
         self._begin = process_time()
 
-    def tell(self, model: AttentionPPO, validation: dict[str, float] | None) -> None:
+    def tell(self, model: AttentionPPO, validation: dict[str, Any] | None) -> None:
         if self._report is not None:
-            done = model.scene_steps
-            self._report(
-                Progress(scene_steps=done, transitions=self.transitions, validation=validation, validated=done)
-            )
+            steps = Progress(scene_steps=model.scene_steps, transitions=self.transitions, validation=validation)
+            self._report(steps)
 
     def _on_step(self) -> bool:
         self.transitions += sum(info["active"] for info in self.locals["infos"])
@@ -169,7 +167,7 @@ class _Run(BaseCallback):
         write_whole(self._folder / HISTORY, (json.dumps(self.history, indent=1) + "\n").encode())
         self._begin = process_time()
 
-    def _validate(self, model: AttentionPPO) -> dict[str, float]:
+    def _validate(self, model: AttentionPPO) -> dict[str, Any]:
         config = self._config
         latest = self._folder / "latest.safetensors"
         card = {
@@ -183,9 +181,10 @@ class _Run(BaseCallback):
             "versions": package_versions(PACKAGES),
         }
         save_attention(model, latest, card)
-        found, _ = judge(latest, self._recordings, config, config.validation_window, Attention)
+        found, _ = validate(latest, self._recordings, config, config.validation_window, Attention)
         score = found["success"] - config.intrusion_weight * found["intrusion_share"]
         if score >= max((entry["score"] for entry in self.history), default=score):
             save_attention(model, self._folder / BEST, {**card, "score": score})
-        self.history.append({"scene_steps": model.scene_steps, "score": score, "cpu_seconds": self.seconds, **found})
-        return found
+        entry = {"scene_steps": model.scene_steps, "score": score, "cpu_seconds": self.seconds, **found}
+        self.history.append(entry)
+        return entry

@@ -11,7 +11,7 @@ from socialnav_mj.controllers.replay_irl import ReplayIRL
 from socialnav_mj.files import write_json, write_whole
 from socialnav_mj.learning.attention_config import AttentionConfig
 from socialnav_mj.learning.config import TrainingConfig
-from socialnav_mj.learning.validation import judge
+from socialnav_mj.learning.validation import validate
 from socialnav_mj.processes import Beside
 from socialnav_mj.recordings import Recording
 
@@ -27,10 +27,8 @@ class Progress:
     """Done so far."""
     transitions: int
     """In the shared buffer, or seen."""
-    validation: dict[str, float] | None
-    """That has just ended, if there is one."""
-    validated: int = 0
-    """Scene steps of the policy that it is of."""
+    validation: Mapping[str, Any] | None
+    """Entry of the history that a validation which has just ended gave, if one has."""
 
 
 def claim(folder: Path, config: Mapping[str, Any]) -> None:
@@ -81,8 +79,10 @@ def complete_card(
     if "metrics" in card:
         return
     parts = {"in_sample": config.train_window, "validation": config.validation_window, "held_out": config.test_window}
-    asked = beside.ask(judge, path, recordings, config, parts["in_sample"], controller)
-    found = {name: judge(path, recordings, config, parts[name], controller)[0] for name in ("validation", "held_out")}
+    asked = beside.ask(validate, path, recordings, config, parts["in_sample"], controller)
+    found = {
+        name: validate(path, recordings, config, parts[name], controller)[0] for name in ("validation", "held_out")
+    }
     found["in_sample"] = asked.result()[0]
     card["metrics"] = {name: {"window": part, **found[name]} for name, part in parts.items()}
     card["history"] = history

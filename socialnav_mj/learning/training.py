@@ -25,7 +25,7 @@ from socialnav_mj.learning.folder import CHECKPOINT, HISTORY, PACKAGES, Progress
 from socialnav_mj.learning.policy_file import copy_policy, save_policy
 from socialnav_mj.learning.replay_irl import ReplayIRL
 from socialnav_mj.learning.shipping import BEST
-from socialnav_mj.learning.validation import is_kept, judge
+from socialnav_mj.learning.validation import is_kept, validate
 from socialnav_mj.processes import Beside
 from socialnav_mj.provenance import package_versions, recording_metadata
 from socialnav_mj.recordings import Recording, load_recording
@@ -173,12 +173,7 @@ class _Checkpoints(BaseCallback):
     def _tell(self, model: ReplayIRL, entry: dict[str, Any] | None) -> None:
         if self._report is not None:
             self._report(
-                Progress(
-                    scene_steps=model.scene_steps,
-                    transitions=model.replay_buffer.size(),
-                    validation=entry,
-                    validated=0 if entry is None else entry["scene_steps"],
-                )
+                Progress(scene_steps=model.scene_steps, transitions=model.replay_buffer.size(), validation=entry)
             )
 
     def _ask(self, entry: dict[str, Any]) -> None:
@@ -196,7 +191,7 @@ class _Checkpoints(BaseCallback):
         latest = self._folder / LATEST
         save_policy(model, latest, card)
         self._asked = entry
-        self._found = self._beside.ask(judge, latest, self._recordings, config, config.validation_window)
+        self._found = self._beside.ask(validate, latest, self._recordings, config, config.validation_window)
 
     def _entry(self) -> dict[str, Any] | None:
         """Wait for the validation under way, if there is one, write it down, and keep the policy if it is the best."""

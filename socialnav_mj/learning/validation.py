@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from socialnav_mj import metrics
-from socialnav_mj.config import Scenario, TurnLimit
+from socialnav_mj.config import Scenario
 from socialnav_mj.controllers import Controller
 from socialnav_mj.controllers.replay_irl import ReplayIRL as Policy
 from socialnav_mj.environment import build_environment
@@ -24,75 +24,43 @@ from socialnav_mj.rollout import rollout
 def validate(
     policy_path: Path,
     recordings: list[Recording],
-    *,
+    config: TrainingConfig | AttentionConfig,
     part: tuple[float, float],
-    shares: tuple[float, ...],
-    turn_limit: TurnLimit = "per_step",
     controller: Callable[..., Controller] = Policy,
-) -> dict[str, float]:
-    """Success and intrusions of a policy in a part of recordings.
+) -> tuple[dict[str, float], float]:
+    """Success and intrusions of a training's policy in a part of recordings, on one thread of whatever process.
 
     Args:
         policy_path: Of the weights.
         recordings: Whole recordings.
-        part: Window, as shares of their duration.
-        shares: Of replaced people; the scenes have draws 0, 1, 2, ...
-        turn_limit: Of the scenes.
+        config: Of the training: shares of replaced people, whose scenes have draws 0, 1, 2, ..., and turn limit.
+        part: Window, as shares of the recordings' duration.
         controller: Drives the policy, a path, that it is given as `policy`.
 
     Returns:
-        success, intrusion_share, time_under_way [s], n_agents.
+        success, intrusion_share, time_under_way [s], n_agents; and the time that it took [s].
     """
+    threadpool_limits(1)  # of numpy's products
+    begin = perf_counter()
     success: list[float] = []
     time: list[float] = []
     intrusions = steps = 0.0
     for recording in recordings:
-        for draw, share in enumerate(shares):
+        for draw, share in enumerate(config.validation_shares):
             environment = build_environment(
-                window(recording, *part), Scenario(share=share, seed=draw, turn_limit=turn_limit)
+                window(recording, *part), Scenario(share=share, seed=draw, turn_limit=config.turn_limit)
             )
             values = metrics.per_agent(rollout(environment, controller(policy=str(policy_path))))
             success += values["success"].astype(float).tolist()
             time += values["time_under_way"].tolist()
             intrusions += float(np.nansum(values["intimate_intrusions"]))
             steps += float(np.nansum(values["active_steps"]))
-    return {
+    found = {
         "success": float(np.mean(success)),
         "intrusion_share": intrusions / max(steps, 1.0),
         "time_under_way": float(np.nanmean(time)),
         "n_agents": float(len(success)),
     }
-
-
-def judge(
-    policy_path: Path,
-    recordings: list[Recording],
-    config: TrainingConfig | AttentionConfig,
-    part: tuple[float, float],
-    controller: Callable[..., Controller] = Policy,
-) -> tuple[dict[str, float], float]:
-    """Validate a policy of a training, in whatever process, on one thread.
-
-    Args:
-        policy_path: Of the weights.
-        recordings: Whole recordings.
-        config: Of the training.
-        part: Window, as shares of their duration.
-        controller: Drives the policy.
-
-    Returns:
-        What `validate` returns, and the time that it took [s].
-    """
-    threadpool_limits(1)  # of numpy's products
-    begin = perf_counter()
-    found = validate(
-        policy_path,
-        recordings,
-        part=part,
-        shares=config.validation_shares,
-        turn_limit=config.turn_limit,
-        controller=controller,
-    )
     return found, perf_counter() - begin
 
 
