@@ -7,13 +7,14 @@ from pathlib import Path
 
 from socialnav_mj import suite
 from socialnav_mj.controllers import BUILT_IN
+from socialnav_mj.controllers.planning.planner import PRESETS, Planner
 from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
 from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.studies.panel import Entry
 
 CONTROLLERS = (
     *(name for name in BUILT_IN if name != "stand_still"),
-    *(f"mpc(preset={name!r})" for name in ("calm", "brisk", "free")),
+    *(f"mpc(preset={name!r})" for name in PRESETS if name != Planner.preset),
 )
 """All built-in ones but the one that goes nowhere, and the planner's other presets."""
 
