@@ -327,3 +327,32 @@ def test_command_runs_ranks_and_publishes_no_episode(tmp_path, capsys):
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")}
     main([*command, "--out", str(out)])
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")} == before
+
+
+OWN = """from dataclasses import dataclass
+
+from socialnav_mj.controllers.go_straight import GoStraight
+
+
+class Mine(GoStraight):
+    pass
+
+
+@dataclass(kw_only=True)
+class Other(GoStraight):
+    name: str = "other_name"
+"""
+
+
+@pytest.mark.parametrize("study", ["leaderboard", "reaction"])
+def test_a_controller_of_a_users_own_joins_under_whatever_name_it_gives_itself(study, tmp_path, monkeypatch, capsys):
+    """Its class calls it go_straight, or other_name, and so do its episodes; the board, as it was asked for."""
+    (tmp_path / "mine.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    names = ["mine:Mine", "mine:Other", "potential_field"]
+    command = [study, "--recordings", TINY, "--scenarios", "4", "--draws", "3", "--jobs", "1", "--out", "out"]
+    main([*command, "--controllers", *names])
+    table = "leaderboard" if study == "leaderboard" else "levels"
+    rows = list(csv.DictReader((tmp_path / "out" / "tables" / f"{table}.csv").open()))
+    found = {row["controller"] for row in rows if row["measure"] == "success" and row["mean"]}
+    assert found - {"human"} == {*names}

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
-from socialnav_mj.controllers import with_policy_of
+from socialnav_mj.controllers import make_controller, with_policy_of
 from socialnav_mj.evaluation import Evaluation
 from socialnav_mj.geometry import Array
 from socialnav_mj.report.intervals import Interval, interval_of
@@ -229,7 +229,7 @@ def compare(
     tables, roster = [], []
     for condition in study.conditions:
         own = results[run_name(recording, condition)].agents
-        specs = {with_policy_of(spec, recording): spec for spec in study.controllers}
+        specs = {make_controller(with_policy_of(spec, recording)).name: spec for spec in study.controllers}
         own = own.filter(pa.compute.is_in(own["controller"], pa.array(list(specs))))
         named = pa.array([at(specs[name], condition) for name in own["controller"].to_pylist()], pa.string())
         tables.append(own.set_column(own.schema.get_field_index("controller"), "controller", named))

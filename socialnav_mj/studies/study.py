@@ -2,13 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from socialnav_mj import suite
-from socialnav_mj.controllers import BUILT_IN
+from socialnav_mj.controllers import BUILT_IN, make_controller
 from socialnav_mj.controllers.planning.planner import PRESETS, Planner
 from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
+from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.results import Results, read_results
 from socialnav_mj.studies.panel import Entry
 
@@ -27,6 +28,14 @@ class Run:
     evaluation: Evaluation
     roster: tuple[Entry, ...]
     """One entry a controller, and the human row."""
+
+    @property
+    def named_roster(self) -> tuple[Entry, ...]:
+        """The roster with the names that episodes give to the controllers; a class of a user's own says its name."""
+        return tuple(
+            entry if entry.method == HUMAN else replace(entry, controller=make_controller(entry.controller).name)
+            for entry in self.roster
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

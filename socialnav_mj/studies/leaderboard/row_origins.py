@@ -34,14 +34,16 @@ def origins_of(run: Run, results: Results) -> list[RowOrigin]:
         In the order of its roster.
     """
     specs: dict[str, list[str]] = {}
-    for entry in run.roster:
+    names: dict[str, list[str]] = {}
+    for entry, named in zip(run.roster, run.named_roster, strict=True):
         specs.setdefault(entry.method, []).append(entry.controller)
+        names.setdefault(entry.method, []).append(named.controller)
     return [
         RowOrigin(
             run=run.name,
             controller=method,
             command=_command(run, [spec for spec in own if spec in run.evaluation.controllers]),
-            digests=tuple(_digest(results, scenario, own) for scenario in run.evaluation.scenarios),
+            digests=tuple(_digest(results, scenario, names[method]) for scenario in run.evaluation.scenarios),
         )
         for method, own in specs.items()
     ]

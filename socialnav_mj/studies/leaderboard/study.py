@@ -146,5 +146,5 @@ def _boards(study: Leaderboard, results: Mapping[str, Results]) -> list[Board]:
     for run in study.runs():
         name, _, setting = run.name.partition(".")
         name, setting = (name, setting) if setting in SETTINGS else (run.name, DEFAULT)
-        boards.append(board_of(results[run.name].agents, run.roster, recording=name, setting=setting))
+        boards.append(board_of(results[run.name].agents, run.named_roster, recording=name, setting=setting))
     return boards
