@@ -13,7 +13,7 @@ from socialnav_mj.cli import main
 from socialnav_mj.controllers.replay_irl import load_policy
 from socialnav_mj.report import style
 from socialnav_mj.studies.levels import LEVEL_MEASURES, LevelTable, levels
-from socialnav_mj.studies.looks import LOOKS, SHADES
+from socialnav_mj.studies.looks import LOOKS, SHADES, looks_of
 from socialnav_mj.studies.panel import METHODS, MIXED, POTENTIAL_FIELD, make_panel
 from socialnav_mj.studies.paper import figures, training_curves
 from socialnav_mj.studies.paper.figures import FIGURES, draw_figures, draw_sweep
@@ -165,6 +165,13 @@ def test_sweep_has_a_tick_at_every_distance(table, tmp_path, monkeypatch):
 def test_scenarios_and_trainings_have_no_methods_colour():
     assert not {*SHADES} & {look.colour for look in LOOKS.values()}
     assert min(np.diff([grey(colour) for colour in SHADES])) > 0.1
+
+
+def test_the_papers_methods_look_the_same_in_all_figures_and_nobody_else_looks_like_them():
+    looks = looks_of(["mpc", "hybrid", "orca", "replay_irl"])
+    assert looks["hybrid"] == LOOKS[MIXED]
+    assert looks["replay_irl"] == LOOKS["replay_irl"]
+    assert len({(look.colour, look.marker, look.line) for look in looks.values()}) == 4
 
 
 @pytest.fixture

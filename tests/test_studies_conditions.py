@@ -1,6 +1,7 @@
 """Studies of conditions: rank correlations by hand, and both commands on the smallest crowd."""
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +91,8 @@ def test_command_runs_resumes_and_publishes_no_episode(name, conditions, tmp_pat
     page = (public / "README.md").read_text()
     for text in ("scenario 4: 90 % agents", "## Does the ranking hold?", "Kendall's tau", "| social_force | "):
         assert text in page
+    shown = re.findall(r"!\[.*\]\((.*)\)", page)
+    assert len(shown) >= 3 and {public / name for name in shown} == {*public.glob("figures/*.png")}
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.npz")}
     assert len(before) == 2 * 3 * 3 * len(conditions)
     main([*command, "--out", str(out)])

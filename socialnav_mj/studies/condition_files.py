@@ -8,7 +8,7 @@ from typing import Any
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.studies.conditions import Comparison, Condition, ConditionStudy, compare
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
-from socialnav_mj.studies.slopes import draw_overview, draw_slopes
+from socialnav_mj.studies.slopes import draw_slopes
 from socialnav_mj.studies.study import read_runs
 
 
@@ -23,11 +23,9 @@ class Subject:
     ranked: Sequence[str]
     """Of these, by which the ranking of controllers is compared."""
     slopes: Sequence[tuple[str, str]]
-    """Measure and label of each row of the figures; the overview has the first."""
-    figure: str
-    """Beginning of the figures' names, before the recording's."""
+    """Measure and label of the axis of each figure, in the order of the page."""
     page: Callable[..., str]
-    """Text of README.md, of the comparisons and `provenance`."""
+    """Text of README.md, of the comparisons, `figures` (recording: Markdown lines) and `provenance`."""
     tables: Mapping[str, Callable[[Sequence[Comparison]], Sequence[Mapping[str, Any]]]] = field(default_factory=dict)
     """Name of a table beside those of all studies: its rows."""
 
@@ -56,9 +54,17 @@ def write_conditions(subject: Subject, study: ConditionStudy, out: Path, *, comm
     write_csv(out / "tables" / "ranking.csv", [row for own in found for row in own.tau_rows()])
     for name, rows in subject.tables.items():
         write_csv(out / "tables" / f"{name}.csv", rows(found))
-    for own in found:
-        draw_overview(own, *subject.slopes[0], out / "figures", f"overview_{own.recording}")
-        draw_slopes(own, subject.slopes, out / "figures", f"{subject.figure}_{own.recording}")
+    figures = {own.recording: _draw(subject, own, out / "figures") for own in found}
     recordings = [load_recording(recording, data_dir=study.data_dir) for recording in study.recordings]
     provenance = write_provenance(study, results, recordings, out, command=command)
-    return write_pages(out, subject.page(found, provenance=provenance), results, command=command)
+    return write_pages(out, subject.page(found, figures=figures, provenance=provenance), results, command=command)
+
+
+def _draw(subject: Subject, own: Comparison, folder: Path) -> list[str]:
+    """Draw all figures of a recording; the lines of Markdown that show them."""
+    lines = []
+    for measure, label in subject.slopes:
+        name = f"{measure}_{own.recording}"
+        draw_slopes(own, measure, label, folder, name)
+        lines += [f"![{label}, {own.recording}]({folder.name}/{name}.png)", ""]
+    return lines

@@ -1,57 +1,30 @@
-"""Slope charts: a line for each controller over the conditions, a column for each scenario, a row for each measure."""
+"""Slope charts: a panel for each controller, in which a line for each scenario leads from condition to condition."""
 
-from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from scipy.optimize import isotonic_regression
+from matplotlib.ticker import MaxNLocator
 
-from socialnav_mj.geometry import Array
 from socialnav_mj.report.style import new_figure, save, style
 from socialnav_mj.studies.conditions import Comparison
-from socialnav_mj.studies.looks import looks_of, short_title
+from socialnav_mj.studies.looks import LINES, MARKERS, SCENARIO_TITLES, SHADES
 
-_BESIDE = 0.1
+ORDER_OF_PANELS = """\
+In the figures controllers stand in the order of their mean success under the first condition; bars are 95 % intervals.\
+"""
+"""How pages explain these figures."""
+_COLUMNS = 5
+"""Panels side by side, at most."""
+_BESIDE = 0.12
 """By which the outermost lines are moved to either side, as a share of the way between two conditions."""
-_FOR_NUMBERS = 0.6
-"""Room to the right of the lines for their numbers, in ways between two conditions."""
-_BEFORE, _FOR_NAMES, _TO_NAMES = 0.1, 0.7, 0.1
-"""Room before the lines, the same for names, and where these begin in it: shares of the way from first to last."""
+_LETTERS_OF_A_TITLE = 24
 
 
-def draw_slopes(comparison: Comparison, rows: Sequence[tuple[str, str]], folder: Path, name: str) -> list[Path]:
-    """Means with 95 % intervals over the conditions, of all measures and scenarios; lines are numbered.
-
-    Args:
-        comparison: Of one recording.
-        rows: Measure and the label of its axis, from top to bottom.
-        folder: Gets a PNG and an SVG.
-        name: Of the files.
-
-    Returns:
-        Paths of the files.
-    """
-    scenarios, last = comparison.scenarios, len(comparison.conditions) - 1
-    with style():
-        figure = new_figure(1.7 + 1.9 * len(rows))
-        grid = figure.subplots(len(rows), len(scenarios), sharex=True, sharey="row", squeeze=False)
-        for place, scenario in enumerate(scenarios):
-            grid[0][place].set_title(short_title(scenario, place))
-        for (measure, label), line in zip(rows, grid, strict=True):
-            ends = [_draw_lines(axes, comparison, s, measure) for s, axes in zip(scenarios, line, strict=True)]
-            for axes, own in zip(line, ends, strict=True):
-                axes.set_xlim(-0.4, last + _FOR_NUMBERS)
-                _label_lines(axes, own, [str(k + 1) for k in range(len(own))], x=1.0, align="right", size=5.5)
-            line[0].set_ylabel(label)
-        handles, labels = grid[0][0].get_legend_handles_labels()
-        numbered = [f"{k + 1} {label}" for k, label in enumerate(labels)]
-        figure.legend(handles, numbered, title=comparison.recording, loc="outside upper center", ncols=4)
-        return save(figure, folder, name)
-
-
-def draw_overview(comparison: Comparison, measure: str, label: str, folder: Path, name: str) -> list[Path]:
-    """One measure in the first and the last scenario, with each controller's name at its line: for a talk.
+def draw_slopes(comparison: Comparison, measure: str, label: str, folder: Path, name: str) -> list[Path]:
+    """Means with 95 % intervals over the conditions, of all controllers and scenarios.
 
     Args:
         comparison: Of one recording.
@@ -63,95 +36,84 @@ def draw_overview(comparison: Comparison, measure: str, label: str, folder: Path
     Returns:
         Paths of the files.
     """
-    scenarios, last = dict.fromkeys((comparison.scenarios[0], comparison.scenarios[-1])), len(comparison.conditions) - 1
+    controllers = in_order(comparison)
+    columns = min(_COLUMNS, len(controllers))
+    rows = -(-len(controllers) // columns)
     with style():
-        figure = new_figure(3.6)
-        grid = figure.subplots(1, len(scenarios), sharey=True, squeeze=False)[0]
-        ends = [_draw_lines(axes, comparison, s, measure) for s, axes in zip(scenarios, grid, strict=True)]
-        for place, (scenario, axes, own) in enumerate(zip(scenarios, grid, ends, strict=True)):
-            axes.set_title(short_title(scenario, place))
-            axes.set_xlim(-_BEFORE * last, (1.0 + _FOR_NAMES) * last)
-            beside = (_BEFORE + 1.0 + _TO_NAMES) / (_BEFORE + 1.0 + _FOR_NAMES)
-            _label_lines(axes, own, list(comparison.controllers), x=beside, align="left", size=7.0)
-        grid[0].set_ylabel(label)
+        figure = new_figure(0.9 + 1.1 * rows)
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for axes, controller in zip(grid.flat, controllers, strict=False):
+            _draw_panel(axes, comparison, controller, measure)
+        for axes in grid.flat[len(controllers) :]:
+            axes.set_axis_off()
+        for k in range(len(controllers) - columns, len(controllers)):
+            _name_conditions(grid.flat[k], comparison, with_room=k >= (rows - 1) * columns)
+        figure.supylabel(label, fontsize="medium")
+        handles, labels = grid[0][0].get_legend_handles_labels()
+        look: dict[str, Any] = {"loc": "outside upper center", "ncols": 4, "fontsize": 7.0, "columnspacing": 1.2}
+        figure.legend(handles, labels, title=comparison.recording, **look)
         return save(figure, folder, name)
 
 
-def spread_apart(values: Array, gap: float, *, low: float, high: float) -> Array:
-    """Places as near to the values as can be, by squares, and so far from each other that labels do not overlap.
+def in_order(comparison: Comparison) -> tuple[str, ...]:
+    """The order of the panels, which is the same in all figures of a recording.
 
     Args:
-        values: Shape (k,), one or more.
-        gap: Least distance of two places.
-        low: Lowest place.
-        high: Highest place, if all have room below.
+        comparison: Of one recording.
 
     Returns:
-        Shape (k,), in the order of the values.
+        Its controllers by the mean over scenarios of the first measure under the first condition, highest first; those
+        that have none are last.
     """
-    order = np.argsort(values, kind="stable")
-    steps = gap * np.arange(len(values))
-    places = np.empty(len(values))
-    # With bounds, the nearest are those without, cut off at them.
-    free = isotonic_regression(values[order] - steps).x
-    places[order] = np.clip(free, low, max(low, high - steps[-1])) + steps
-    return places
+    first, measure = comparison.conditions[0], comparison.measures[0]
+
+    def mean(controller: str) -> float:
+        found = [comparison.level(scenario, controller, first, measure) for scenario in comparison.scenarios]
+        return float(np.mean([level.interval.mean for level in found if level is not None] or [-np.inf]))
+
+    return tuple(sorted(comparison.controllers, key=mean, reverse=True))
 
 
-def _draw_lines(axes: Axes, comparison: Comparison, scenario: str, measure: str) -> Array:
-    """Draw a line for each controller; where they end, shape (n_controllers, 2), NaN for who has no value."""
-    conditions, n = comparison.conditions, len(comparison.controllers)
-    places = np.arange(len(conditions))
-    beside = _BESIDE * np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1)
-    ends = np.full((n, 2), np.nan)
-    looks = looks_of(comparison.controllers)
-    for k, controller in enumerate(comparison.controllers):
-        found = [comparison.level(scenario, controller, condition, measure) for condition in conditions]
-        values = np.array(
+def _draw_panel(axes: Axes, comparison: Comparison, controller: str, measure: str) -> None:
+    scenarios, places = comparison.scenarios, np.arange(len(comparison.conditions))
+    for k, scenario in enumerate(scenarios):
+        found = [comparison.level(scenario, controller, condition, measure) for condition in comparison.conditions]
+        means, lows, highs = np.array(
             [(np.nan,) * 3 if f is None else (f.interval.mean, f.interval.low, f.interval.high) for f in found]
-        )
+        ).T
         axes.errorbar(
-            places + beside[k],
-            values[:, 0],
-            yerr=np.maximum(np.nan_to_num(np.abs(values[:, 1:] - values[:, :1])), 0.0).T,
-            color=looks[controller].colour,
-            marker=looks[controller].marker,
-            linestyle=looks[controller].line,
-            markersize=3.2,
+            places + _BESIDE * (2.0 * k / max(len(scenarios) - 1, 1) - 1.0),
+            means,
+            yerr=np.maximum(np.nan_to_num([means - lows, highs - means]), 0.0),
+            color=SHADES[k % len(SHADES)],
+            marker=MARKERS[k % len(MARKERS)],
+            linestyle=LINES[k % len(LINES)],
+            markersize=2.6,
             linewidth=0.9,
             elinewidth=0.5,
             capsize=1.0,
-            label=controller,
+            label=SCENARIO_TITLES.get(scenario, scenario),
         )
-        ends[k] = places[-1] + beside[k], values[-1, 0]
-    axes.set_xticks(places, [condition.name for condition in conditions])
-    return ends
+    axes.set_title(fill(controller, _LETTERS_OF_A_TITLE), fontsize=7.0)
+    axes.set_xlim(-0.35, places[-1] + 0.35)
+    axes.set_xticks(places, [""] * len(places))
+    axes.yaxis.set_major_locator(MaxNLocator(4, min_n_ticks=3))
+    axes.tick_params(labelsize=6.5)
 
 
-def _label_lines(axes: Axes, ends: Array, labels: Sequence[str], *, x: float, align: str, size: float) -> None:
-    """Write what each line is called beside its end, at `x` of the axes' width, and lead to it from there."""
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high)
-    there = np.flatnonzero(np.isfinite(ends[:, 1]))
-    if not there.size:
-        return
-    height = axes.get_window_extent().height / axes.figure.dpi * 72.0
-    heights = spread_apart((ends[there, 1] - low) / (high - low), 1.25 * size / height, low=0.02, high=0.98)
-    for k, y in zip(there, heights, strict=True):
-        axes.annotate(
-            labels[int(k)],
-            ends[k],
-            xytext=(x, y),
-            textcoords="axes fraction",
-            ha=align,
-            va="center",
-            fontsize=size,
-            arrowprops={
-                "arrowstyle": "-",
-                "linewidth": 0.3,
-                "color": "0.6",
-                "shrinkA": 1.0,
-                "shrinkB": 1.5,
-                "relpos": (0.0, 0.5),
-            },
+def _name_conditions(axes: Axes, comparison: Comparison, *, with_room: bool) -> None:
+    """Write the conditions below a panel; `with_room` says whether the next row of panels moves away for them."""
+    for k, condition in enumerate(comparison.conditions):
+        name = axes.annotate(
+            condition.name,
+            (k, 0.0),
+            xytext=(2.0, -5.0),
+            xycoords=axes.get_xaxis_transform(),
+            textcoords="offset points",
+            fontsize=6.5,
+            ha="right",
+            va="top",
+            rotation=30.0,
+            rotation_mode="anchor",
         )
+        name.set_in_layout(with_room)

@@ -3,12 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import interval, table
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.looks import SCENARIO_TITLES
+from socialnav_mj.studies.slopes import ORDER_OF_PANELS
 
 IDEAL = "unicycle"
 """The condition that stands for a kinematic simulator."""
@@ -25,7 +28,7 @@ that follows every command exactly, whatever it touches; a *heavy* base that acc
 *Verdict*: what of the unicycle's numbers lies off those of the wheels by more than its interval; every statement is \
 its own test at 95 %. *Tracking error*: between where a command leads and where the robot is a control step later. \
 *Not met*: share of control steps at whose end the robot is off the commanded twist by more than 0.1 m/s or 0.2 rad/s, \
-since its motors are at their limit, it slips, or it is held. {ONE_RECORDING}
+since its motors are at their limit, it slips, or it is held. {ORDER_OF_PANELS} {ONE_RECORDING}
 """
 
 
@@ -73,11 +76,14 @@ def verdict_rows(found: Sequence[Comparison]) -> list[dict[str, Any]]:
     ]
 
 
-def plant_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any]) -> str:
+def plant_page(
+    found: Sequence[Comparison], *, figures: Mapping[str, Sequence[str]], provenance: Mapping[str, Any]
+) -> str:
     """Text of the study's README.md.
 
     Args:
         found: One comparison for each recording.
+        figures: Name of the recording: lines that show its figures.
         provenance: Command, experiment, recordings, runs.
 
     Returns:
@@ -87,14 +93,7 @@ def plant_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any]) ->
     lines += ["## What would a kinematic simulator have told wrongly?", "", *_verdicts(found)]
     lines += ["## Does the ranking hold?", "", *_ranking(found)]
     for own in found:
-        lines += [
-            f"## {own.recording}",
-            "",
-            f"![overview](figures/overview_{own.recording}.png)",
-            "",
-            f"![plants](figures/plants_{own.recording}.png)",
-            "",
-        ]
+        lines += [f"## {own.recording}", "", *figures[own.recording]]
         for scenario in own.scenarios:
             lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(own, scenario)]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
@@ -109,7 +108,22 @@ def _verdicts(found: Sequence[Comparison]) -> list[str]:
                 f"{SCENARIO_TITLES.get(s, s).split(':')[0]}: {', '.join(said)}" for s, said in told.items() if said
             ]
             rows.append([controller, own.recording, "; ".join(texts) or "nothing that these draws show"])
-    return table(["controller", "recording", "told wrongly"], rows)
+    return [_how_many(found), "", *table(["controller", "recording", "told wrongly"], rows)]
+
+
+def _how_many(found: Sequence[Comparison]) -> str:
+    """How many statements could have been made, how many were, and how many chance alone would have made."""
+    possible = sum(
+        bool(np.isfinite((gap.low, gap.high)).all())
+        for own in found
+        for (_, _, condition, measure), gap in own.differences.items()
+        if condition == IDEAL and measure in JUDGED
+    )
+    made = sum(
+        len(verdict(own, scenario, name)) for own in found for scenario in own.scenarios for name in own.controllers
+    )
+    chance = f"were nothing told wrongly, chance would show some {0.05 * possible:.0f}"
+    return f"Told wrongly: {made} of {possible} numbers; {chance}."
 
 
 def _ranking(found: Sequence[Comparison]) -> list[str]:

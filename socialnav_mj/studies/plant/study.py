@@ -21,9 +21,8 @@ PLANT = Subject(
     slopes=(
         ("success", "share that succeeds"),
         ("time_under_way", "time, censored [s]"),
-        ("tracking_error", "tracking error\na step [m]"),
+        ("tracking_error", "tracking error a step [m]"),
     ),
-    figure="plants",
     page=plant_page,
     tables={"verdicts": verdict_rows},
 )

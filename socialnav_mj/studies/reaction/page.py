@@ -9,6 +9,7 @@ from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.looks import SCENARIO_TITLES
+from socialnav_mj.studies.slopes import ORDER_OF_PANELS
 
 _HOW_TO_READ = f"""\
 Every controller drove the same agents among the same people, who keep to the recording (*replay*), or step off it for \
@@ -16,15 +17,18 @@ robots and come back: *weak* and *yielding* bracket the unknown strength (docs/s
 *Difference*: the level minus replay, paired by agent, with its 95 % interval. *Imposed deviation* and *delay*: metres \
 and seconds by which an agent makes people leave their recorded tracks, a cost that replay cannot show. *Kendall's \
 tau*: how alike two rankings of the controllers are, 1 for the same, -1 for the reverse; its interval is a bootstrap \
-over draws. {ONE_RECORDING}
+over draws. {ORDER_OF_PANELS} {ONE_RECORDING}
 """
 
 
-def reaction_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any]) -> str:
+def reaction_page(
+    found: Sequence[Comparison], *, figures: Mapping[str, Sequence[str]], provenance: Mapping[str, Any]
+) -> str:
     """Text of the study's README.md.
 
     Args:
         found: One comparison for each recording.
+        figures: Name of the recording: lines that show its figures.
         provenance: Command, experiment, recordings, runs.
 
     Returns:
@@ -34,14 +38,7 @@ def reaction_page(found: Sequence[Comparison], *, provenance: Mapping[str, Any])
     lines += ["## Does the ranking hold?", "", *_ranking(found)]
     lines += ["## How far controllers lie apart", "", *_spread(found)]
     for own in found:
-        lines += [
-            f"## {own.recording}",
-            "",
-            f"![overview](figures/overview_{own.recording}.png)",
-            "",
-            f"![slopes](figures/slopes_{own.recording}.png)",
-            "",
-        ]
+        lines += [f"## {own.recording}", "", *figures[own.recording]]
         for scenario in own.scenarios:
             lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(own, scenario)]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"

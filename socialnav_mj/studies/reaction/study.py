@@ -19,10 +19,9 @@ REACTION = Subject(
     ranked=_RANKED,
     slopes=(
         ("success", "share that succeeds"),
-        ("intrusion_share_of_steps", "share of steps\nwithin 1.2 m"),
-        ("deviation_imposed", "imposed\ndeviation [m]"),
-        ("delay_imposed", "imposed\ndelay [s]"),
+        ("intrusion_share_of_steps", "share of steps within 1.2 m"),
+        ("deviation_imposed", "imposed deviation [m]"),
+        ("delay_imposed", "imposed delay [s]"),
     ),
-    figure="slopes",
     page=reaction_page,
 )
