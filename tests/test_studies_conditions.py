@@ -29,15 +29,42 @@ def quick(monkeypatch):
 def test_tau_of_clear_rankings_is_that_of_the_means_and_of_noise_wide():
     random = np.random.default_rng(0)
     clear = np.array([0.1, 0.3, 0.5, 0.9]) + random.normal(0.0, 0.001, (10, 4))
-    same = kendall(clear, clear + 0.2)
-    assert (same.mean, same.low, same.high) == (1.0, 1.0, 1.0)
-    assert kendall(clear, -clear).mean == -1.0
+    same = kendall(clear, clear + random.normal(0.2, 0.001, (10, 4)))
+    assert (same.mean, same.low, same.high, same.told_apart, same.turned_over) == (1.0, 1.0, 1.0, 6, 0)
+    reverse = kendall(clear, -clear)
+    assert (reverse.mean, reverse.low, reverse.high, reverse.told_apart, reverse.turned_over) == (-1, -1, -1, 6, 6)
     # 3 of 6 pairs change over if the last becomes the first: tau = (3 - 3) / 6.
-    assert kendall(clear, clear[:, [3, 0, 1, 2]]).mean == pytest.approx(0.0)
+    moved = kendall(clear, clear[:, [3, 0, 1, 2]])
+    assert moved.mean == moved.low == moved.high == pytest.approx(0.0) and moved.turned_over == 3
     noise = kendall(random.normal(size=(10, 4)), random.normal(size=(10, 4)))
     assert noise.high - noise.low > 0.5
     few = kendall(clear[:2], clear[:2])
     assert few.mean == 1.0 and np.isnan(few.low)
+
+
+def test_a_pair_that_draws_do_not_tell_apart_can_have_any_order():
+    random = np.random.default_rng(2)
+    clear = np.array([0.1, 0.5, 0.9, 0.9]) + random.normal(0.0, 0.001, (10, 4))
+    clear[:, 3] = clear[:, 2] + np.tile([-0.01, 0.01], 5)
+    tau = kendall(clear, clear)
+    assert (tau.told_apart, tau.low, tau.high) == (5, pytest.approx(2 / 3), 1.0)
+
+
+@pytest.mark.parametrize("n_draws", [3, 5, 10])
+@pytest.mark.parametrize("moved", [0.0, 0.05])
+def test_interval_of_tau_holds_that_of_the_rankings_behind_the_draws(n_draws, moved):
+    """Nineteen controllers, half of them close together, as on the leaderboard; .95 is asked for."""
+    covered = 0
+    for k in range(200):
+        random = np.random.default_rng(k)
+        one = np.concatenate([random.uniform(0.4, 0.9, 9), random.uniform(0.95, 0.99, 10)])
+        two = one + random.normal(0.0, moved, 19)
+        varied = np.where(one < 0.94, 0.05, 0.01)
+        own, common = random.normal(size=(2, n_draws, 19)), random.normal(size=(n_draws, 19))
+        studies = [mean + varied * (0.7 * common + 0.7 * noise) for mean, noise in zip((one, two), own, strict=True)]
+        tau = kendall(*studies)
+        covered += bool(tau.low - 1e-9 <= tau_b(one, two) <= tau.high + 1e-9)
+    assert covered / 200 >= 0.95
 
 
 def test_kendalls_tau_is_scipys_also_with_ties():
@@ -54,11 +81,20 @@ def test_kendalls_tau_is_scipys_also_with_ties():
     [
         ({"recordings": ()}, r"recordings = \(\) is not allowed"),
         ({"controllers": ("orca",)}, "two or more, each once"),
+        ({"draws": 3, "other_draws": 4}, "other_draws = 4 is not allowed; allowed: 1 to draws = 3"),
     ],
 )
 def test_impossible_studies_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         ConditionStudy(**{"recordings": (TINY,), "conditions": REACTION.conditions, **changes})
+
+
+def test_recordings_behind_the_first_can_have_fewer_draws():
+    study = ConditionStudy(recordings=("students003", "zara01"), conditions=REACTION.conditions, draws=5, other_draws=3)
+    assert [(run.name, run.evaluation.draws) for run in study.runs() if "weak" in run.name] == [
+        ("students003_weak", 5),
+        ("zara01_weak", 3),
+    ]
 
 
 @pytest.mark.parametrize("conditions", [REACTION.conditions, PLANT.conditions])

@@ -120,6 +120,8 @@ class _Conditions:
     """Scenarios to run."""
     draws: int = 10
     """Random choices of the replaced people."""
+    other_draws: int | None = None
+    """Draws on the recordings behind the first; all by default."""
     seed: int = 100
     """Seed of the first draw; the others count up from it. Draws below 100 are for choosing, not for reporting."""
     jobs: int = -1
@@ -149,6 +151,7 @@ class _Conditions:
             data_dir=None if self.data_dir is None else str(self.data_dir),
             scenarios=tuple(f"scenario_{number}" for number in self.scenarios),
             draws=self.draws,
+            other_draws=self.other_draws,
             seed=self.seed,
         )
         run_study(

@@ -19,7 +19,7 @@ from socialnav_mj.studies.kendall import Tau, kendall
 from socialnav_mj.studies.levels import LevelTable, levels
 from socialnav_mj.studies.panel import Entry, Panel, Term, make_panel
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
-from socialnav_mj.studies.study import CONTROLLERS, Run, Study
+from socialnav_mj.studies.study import Run, SideBySide
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,23 +33,11 @@ class Condition:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConditionStudy(Study):
+class ConditionStudy(SideBySide):
     """Every controller on every recording under every condition."""
 
-    recordings: tuple[str, ...]
-    """Names in the catalogue, or paths."""
     conditions: tuple[Condition, ...]
     """The first is what the others are compared with."""
-    controllers: tuple[str, ...] = CONTROLLERS
-    """As `make_controller` takes them; learned ones act with the policy of the recording, if there is one."""
-    policies: tuple[str, ...] = ()
-    """Not asked: policies are part of the controllers."""
-
-    def __post_init__(self) -> None:
-        if not self.recordings or len({recording_name(r) for r in self.recordings}) < len(self.recordings):
-            raise ValueError(f"recordings = {self.recordings} is not allowed; allowed: one or more of different names")
-        if len(self.controllers) < 2 or len(set(self.controllers)) < len(self.controllers):
-            raise ValueError(f"controllers = {self.controllers} is not allowed; allowed: two or more, each once")
 
     def runs(self) -> list[Run]:
         """One evaluation for each recording and condition.
@@ -66,7 +54,7 @@ class ConditionStudy(Study):
             data_dir=self.data_dir,
             scenarios=self.scenarios,
             controllers=tuple(specs.values()),
-            draws=self.draws,
+            draws=self.draws_of(recording),
             seed=self.seed,
             task_kwargs=condition.task_kwargs,
         )
@@ -185,6 +173,8 @@ class Comparison:
                 "kendall_tau": tau.mean,
                 "low": tau.low,
                 "high": tau.high,
+                "pairs_told_apart": tau.told_apart,
+                "pairs_turned_over": tau.turned_over,
             }
             for (scenario, condition, measure), tau in self.taus.items()
         ]

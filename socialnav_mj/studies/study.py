@@ -11,6 +11,7 @@ from socialnav_mj.controllers.planning.planner import PRESETS, Planner
 from socialnav_mj.evaluation import Done, Evaluation, EvaluationError, Job, evaluate, jobs_of
 from socialnav_mj.report.paired import HUMAN
 from socialnav_mj.report.results import Results, read_results
+from socialnav_mj.studies.held_out import recording_name
 from socialnav_mj.studies.panel import Entry
 
 CONTROLLERS = (
@@ -62,6 +63,40 @@ class Study(ABC):
     def jobs(self) -> list[Job]:
         """Every episode of every run."""
         return [job for run in self.runs() for job in jobs_of(run.evaluation)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SideBySide(Study):
+    """Controllers side by side, on several recordings."""
+
+    recordings: tuple[str, ...]
+    """Names in the catalogue, or paths."""
+    controllers: tuple[str, ...] = CONTROLLERS
+    """As `make_controller` takes them; learned ones act with the policy of the recording, if there is one."""
+    policies: tuple[str, ...] = ()
+    """Not asked: policies are part of the controllers."""
+    other_draws: int | None = None
+    """Draws wherever `draws` are not run, the first ones of these; None for all."""
+
+    def __post_init__(self) -> None:
+        if not self.recordings or len({recording_name(r) for r in self.recordings}) < len(self.recordings):
+            raise ValueError(f"recordings = {self.recordings} is not allowed; allowed: one or more of different names")
+        if len(self.controllers) < 2 or len(set(self.controllers)) < len(self.controllers):
+            raise ValueError(f"controllers = {self.controllers} is not allowed; allowed: two or more, each once")
+        if self.other_draws is not None and not 1 <= self.other_draws <= self.draws:
+            raise ValueError(f"other_draws = {self.other_draws} is not allowed; allowed: 1 to draws = {self.draws}")
+
+    def draws_of(self, recording: str, *, all_of_them: bool = True) -> int:
+        """How often people are replaced.
+
+        Args:
+            recording: One of `recordings`; the first has all draws.
+            all_of_them: Whether it has them here too.
+
+        Returns:
+            `draws` or `other_draws`.
+        """
+        return self.draws if recording == self.recordings[0] and all_of_them else self.other_draws or self.draws
 
 
 def learned(policy: str) -> str:

@@ -18,33 +18,22 @@ from socialnav_mj.studies.leaderboard.page import figure_of, leaderboard_page
 from socialnav_mj.studies.leaderboard.row_origins import origins_of
 from socialnav_mj.studies.panel import Entry
 from socialnav_mj.studies.settings import DEFAULT, SETTINGS
-from socialnav_mj.studies.study import CONTROLLERS, Run, Study, read_runs
+from socialnav_mj.studies.study import Run, SideBySide, read_runs
 
 
 @dataclass(frozen=True, kw_only=True)
-class Leaderboard(Study):
-    """What is to be run."""
+class Leaderboard(SideBySide):
+    """What is to be run; the other settings have `other_draws`."""
 
-    recordings: tuple[str, ...]
-    """Names in the catalogue, or paths."""
-    controllers: tuple[str, ...] = CONTROLLERS
-    """As `make_controller` takes them; learned ones act with the policy of the recording, if there is one."""
-    policies: tuple[str, ...] = ()
-    """Not asked: policies are part of the controllers."""
     trainings: int = 3
     """Of each controller that learned and has as many, those with the least seeds; others stand with one."""
     settings: tuple[str, ...] = ()
     """Other settings in which the first recording is run, of `SETTINGS`."""
     setting_controllers: tuple[str, ...] = ()
     """Those of `controllers` that run in these; all if there are none."""
-    other_draws: int | None = None
-    """Draws on the other recordings and in the other settings, the first ones of `draws`; None for all."""
 
     def __post_init__(self) -> None:
-        if not self.recordings or len({recording_name(r) for r in self.recordings}) < len(self.recordings):
-            raise ValueError(f"recordings = {self.recordings} is not allowed; allowed: one or more of different names")
-        if len(self.controllers) < 2 or len(set(self.controllers)) < len(self.controllers):
-            raise ValueError(f"controllers = {self.controllers} is not allowed; allowed: two or more, each once")
+        super().__post_init__()
         if unknown := [name for name in self.settings if name not in SETTINGS]:
             raise ValueError(f"unknown setting {unknown[0]!r}; available: {', '.join(SETTINGS)}")
         if self.trainings < 1:
@@ -56,8 +45,6 @@ class Leaderboard(Study):
         if len(set(self.setting_controllers)) != len(self.setting_controllers) or len(self.setting_controllers) == 1:
             given = self.setting_controllers
             raise ValueError(f"setting_controllers = {given} is not allowed; allowed: none, or two or more, each once")
-        if self.other_draws is not None and not 1 <= self.other_draws <= self.draws:
-            raise ValueError(f"other_draws = {self.other_draws} is not allowed; allowed: 1 to draws = {self.draws}")
 
     def roster(self, recording: str, setting: str = DEFAULT) -> tuple[Entry, ...]:
         """Who runs on a recording.
@@ -92,13 +79,12 @@ class Leaderboard(Study):
 
     def _run(self, recording: str, setting: str) -> Run:
         roster = self.roster(recording, setting)
-        is_first = recording == self.recordings[0] and setting == DEFAULT
         evaluation = Evaluation(
             dataset=recording,
             data_dir=self.data_dir,
             scenarios=self.scenarios,
             controllers=tuple(entry.controller for entry in roster if entry.method != HUMAN),
-            draws=self.draws if is_first else self.other_draws or self.draws,
+            draws=self.draws_of(recording, all_of_them=setting == DEFAULT),
             seed=self.seed,
             task_kwargs=dict(SETTINGS[setting].task_kwargs),
         )

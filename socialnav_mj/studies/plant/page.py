@@ -7,9 +7,10 @@ import numpy as np
 
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import interval, table
-from socialnav_mj.studies.cells import interval_cell, mean_cell
+from socialnav_mj.studies.cells import interval_cell, mean_cell, tau_cell
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.files import traceability
+from socialnav_mj.studies.kendall import EXPLAINED
 from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.slopes import ORDER_OF_PANELS
 
@@ -28,7 +29,8 @@ that follows every command exactly, whatever it touches; a *heavy* base that acc
 *Verdict*: what of the unicycle's numbers lies off those of the wheels by more than its interval; every statement is \
 its own test at 95 %. *Tracking error*: between where a command leads and where the robot is a control step later. \
 *Not met*: share of control steps at whose end the robot is off the commanded twist by more than 0.1 m/s or 0.2 rad/s, \
-since its motors are at their limit, it slips, or it is held. {ORDER_OF_PANELS} {ONE_RECORDING}
+since its motors are at their limit, it slips, or it is held. {EXPLAINED} \
+{ORDER_OF_PANELS} {ONE_RECORDING}
 """
 
 
@@ -132,11 +134,7 @@ def _ranking(found: Sequence[Comparison]) -> list[str]:
             own.recording,
             SCENARIO_TITLES.get(scenario, scenario),
             measure.replace("_", " "),
-            *(
-                interval(tau.mean, tau.low, tau.high, 2)
-                for other in own.conditions[1:]
-                for tau in (own.taus[scenario, other.name, measure],)
-            ),
+            *(tau_cell(own.taus[scenario, other.name, measure]) for other in own.conditions[1:]),
         ]
         for own in found
         for scenario in own.scenarios

@@ -5,9 +5,10 @@ from typing import Any
 
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import interval, table
-from socialnav_mj.studies.cells import interval_cell, mean_cell
+from socialnav_mj.studies.cells import interval_cell, mean_cell, tau_cell
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.files import traceability
+from socialnav_mj.studies.kendall import EXPLAINED
 from socialnav_mj.studies.looks import SCENARIO_TITLES
 from socialnav_mj.studies.slopes import ORDER_OF_PANELS
 
@@ -15,9 +16,8 @@ _HOW_TO_READ = f"""\
 Every controller drove the same agents among the same people, who keep to the recording (*replay*), or step off it for \
 robots and come back: *weak* and *yielding* bracket the unknown strength (docs/simulation.md, "People who react"). \
 *Difference*: the level minus replay, paired by agent, with its 95 % interval. *Imposed deviation* and *delay*: metres \
-and seconds by which an agent makes people leave their recorded tracks, a cost that replay cannot show. *Kendall's \
-tau*: how alike two rankings of the controllers are, 1 for the same, -1 for the reverse; its interval is a bootstrap \
-over draws. {ORDER_OF_PANELS} {ONE_RECORDING}
+and seconds by which an agent makes people leave their recorded tracks, a cost that replay cannot show. {EXPLAINED} \
+{ORDER_OF_PANELS} {ONE_RECORDING}
 """
 
 
@@ -51,12 +51,7 @@ def _ranking(found: Sequence[Comparison]) -> list[str]:
         [
             own.recording,
             SCENARIO_TITLES.get(scenario, scenario),
-            *(
-                interval(tau.mean, tau.low, tau.high, 2)
-                for measure in measures
-                for name in names
-                for tau in (own.taus[scenario, name, measure],)
-            ),
+            *(tau_cell(own.taus[scenario, name, measure]) for measure in measures for name in names),
         ]
         for own in found
         for scenario in own.scenarios
