@@ -1,13 +1,16 @@
-"""Slope charts show every controller, in one order, with every condition named below every column."""
+"""Slope charts show every controller and condition in one order; pages name who falls behind whom."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from socialnav_mj.report.intervals import Interval
 from socialnav_mj.studies.conditions import Comparison, Condition, at
+from socialnav_mj.studies.kendall import kendall
 from socialnav_mj.studies.levels import Level, LevelTable
+from socialnav_mj.studies.ranking import ranking_lines, turned_rows
 from socialnav_mj.studies.slopes import draw_slopes, in_order
 
 CONDITIONS = (Condition(name="before", title="Before"), Condition(name="after", title="After"))
@@ -22,11 +25,11 @@ def level(scenario: str, controller: str, condition: Condition, mean: float) -> 
     return Level(scenario=scenario, method=method, training=None, measure="success", interval=interval, n_values=9)
 
 
-def comparison(means: dict[str, float]) -> Comparison:
-    """Two scenarios; scenario 2 and what is after are better by .1; who has NaN has no levels."""
+def comparison(means: dict[str, float], *scenarios: str) -> Comparison:
+    """Two scenarios or those given; scenario 2 and what is after are better by .1; who has NaN has no levels."""
     rows = [
         level(scenario, controller, condition, mean + 0.1 * k + 0.1 * late)
-        for k, scenario in enumerate(("scenario_1", "scenario_2"))
+        for k, scenario in enumerate(scenarios or ("scenario_1", "scenario_2"))
         for controller, mean in means.items()
         for late, condition in enumerate(CONDITIONS)
         if np.isfinite(mean)
@@ -63,3 +66,19 @@ def test_long_names_are_broken_into_lines(tmp_path) -> None:
     _, svg = draw_slopes(comparison({name: 0.5}), "success", "share", tmp_path, "chart")
     lines = [line for line in re.findall(r">([^<>]+)</", svg.read_text()) if line.strip() and line.strip() in name]
     assert "".join(lines) == name and len(lines) == 2
+
+
+def test_page_and_table_name_who_falls_behind_whom() -> None:
+    random = np.random.default_rng(3)
+    one, two, same = (
+        np.array(means) + random.normal(0.0, 0.001, (5, 3))
+        for means in ((0.9, 0.5, 0.1), (0.5, 0.9, 0.1), (0.8, 0.5, 0.2))
+    )
+    made = comparison({"hare": 0.9, "tortoise": 0.5, "snail": 0.1}, "scenario_1")
+    turned = replace(made, taus={("scenario_1", "after", "success"): kendall(one, two)})
+    (row,) = turned_rows([turned])
+    assert (row["more_before"], row["more_then"], row["condition"]) == ("hare", "tortoise", "after")
+    page = "\n".join(ranking_lines([turned]))
+    assert "0.33 (0.33 to 0.33); 1 of 3" in page and "| after | hare | tortoise |" in page
+    page = "\n".join(ranking_lines([replace(made, taus={("scenario_1", "after", "success"): kendall(one, same)})]))
+    assert "1.00 (1.00 to 1.00); 0 of 3" in page and "No two controllers" in page

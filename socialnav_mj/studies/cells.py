@@ -1,9 +1,6 @@
 """Means and intervals as text of table cells."""
 
-from math import isnan
-
 from socialnav_mj.report.markdown import Sign, interval, number
-from socialnav_mj.studies.kendall import Tau
 from socialnav_mj.studies.levels import Level
 
 
@@ -31,16 +28,3 @@ def interval_cell(level: Level | None, sign: Sign = "") -> str:
         Three digits behind the point; "-" where there is nothing to tell.
     """
     return "-" if level is None else interval(level.interval.mean, level.interval.low, level.interval.high, 3, sign)
-
-
-def tau_cell(tau: Tau) -> str:
-    """A rank correlation, its interval, and the pairs behind it.
-
-    Args:
-        tau: NaN if there is none.
-
-    Returns:
-        Such as "0.82 (0.37 to 1.00); 2 of 62"; without pairs where draws are too few for an interval.
-    """
-    cell = interval(tau.mean, tau.low, tau.high, 2)
-    return cell if isnan(tau.low) else f"{cell}; {tau.turned_over} of {tau.told_apart}"

@@ -8,6 +8,7 @@ from typing import Any
 from socialnav_mj.recordings import load_recording
 from socialnav_mj.studies.conditions import Comparison, Condition, ConditionStudy, compare
 from socialnav_mj.studies.files import write_csv, write_pages, write_provenance
+from socialnav_mj.studies.ranking import TURNED, turned_rows
 from socialnav_mj.studies.slopes import draw_slopes
 from socialnav_mj.studies.study import read_runs
 
@@ -52,6 +53,7 @@ def write_conditions(subject: Subject, study: ConditionStudy, out: Path, *, comm
     write_csv(out / "tables" / "levels.csv", [row for own in found for row in own.level_rows()])
     write_csv(out / "tables" / "differences.csv", [row for own in found for row in own.difference_rows()])
     write_csv(out / "tables" / "ranking.csv", [row for own in found for row in own.tau_rows()])
+    write_csv(out / "tables" / "turned_over.csv", turned_rows(found), TURNED)
     for name, rows in subject.tables.items():
         write_csv(out / "tables" / f"{name}.csv", rows(found))
     figures = {own.recording: _draw(subject, own, out / "figures") for own in found}

@@ -174,7 +174,7 @@ class Comparison:
                 "low": tau.low,
                 "high": tau.high,
                 "pairs_told_apart": tau.told_apart,
-                "pairs_turned_over": tau.turned_over,
+                "pairs_turned_over": len(tau.turned_over),
             }
             for (scenario, condition, measure), tau in self.taus.items()
         ]

@@ -145,14 +145,15 @@ def level_rows(found: Sequence[Level], **labels: Any) -> list[dict[str, Any]]:
     ]
 
 
-def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> None:
     """Write a table; numbers with six digits, NaN as nothing.
 
     Args:
         path: CSV file to be written.
         rows: All with the columns of the first.
+        columns: Of a table that can be without rows.
     """
-    write_whole(path, csv_bytes(list(rows[0]) if rows else [], rows, number=".6g"))
+    write_whole(path, csv_bytes(list(columns or (rows[0] if rows else ())), rows, number=".6g"))
 
 
 def publish(out: Path, folder: Path, names: Iterable[str]) -> Path:

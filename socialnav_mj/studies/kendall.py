@@ -30,8 +30,8 @@ class Tau:
     """If none has."""
     told_apart: int
     """Pairs that draws tell apart in both rankings."""
-    turned_over: int
-    """Those of them that have changed over."""
+    turned_over: tuple[tuple[int, int], ...]
+    """Those of them that have changed over: who has more in the first ranking, who in the second."""
 
 
 def kendall(one: Array, two: Array) -> Tau:
@@ -52,17 +52,19 @@ def kendall(one: Array, two: Array) -> Tau:
     kept = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
     one, two = one[kept], two[kept]
     if not len(one):
-        return Tau(mean=np.nan, low=np.nan, high=np.nan, told_apart=0, turned_over=0)
+        return Tau(mean=np.nan, low=np.nan, high=np.nan, told_apart=0, turned_over=())
     mean = float(tau_b(one.mean(axis=0), two.mean(axis=0)))
     if len(one) < LEAST:
-        return Tau(mean=mean, low=np.nan, high=np.nan, told_apart=0, turned_over=0)
-    both = _orders(one) * _orders(two)
-    told_apart, turned_over = int(np.count_nonzero(both)), int(np.count_nonzero(both < 0))
-    same = told_apart - turned_over
+        return Tau(mean=mean, low=np.nan, high=np.nan, told_apart=0, turned_over=())
+    first, second = _orders(one), _orders(two)
+    pairs = zip(*np.triu_indices(one.shape[1], 1), first, second, strict=True)
+    turned_over = tuple((int(i), int(j)) if a > 0 else (int(j), int(i)) for i, j, a, b in pairs if a * b < 0)
+    told_apart = int(np.count_nonzero(first * second))
+    same = told_apart - len(turned_over)
     return Tau(
         mean=mean,
-        low=min(2.0 * same / both.size - 1.0, mean),
-        high=max(1.0 - 2.0 * turned_over / both.size, mean),
+        low=min(2.0 * same / first.size - 1.0, mean),
+        high=max(1.0 - 2.0 * len(turned_over) / first.size, mean),
         told_apart=told_apart,
         turned_over=turned_over,
     )

@@ -7,11 +7,12 @@ import numpy as np
 
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import interval, table
-from socialnav_mj.studies.cells import interval_cell, mean_cell, tau_cell
+from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.kendall import EXPLAINED
 from socialnav_mj.studies.looks import SCENARIO_TITLES
+from socialnav_mj.studies.ranking import ranking_lines
 from socialnav_mj.studies.slopes import ORDER_OF_PANELS
 
 IDEAL = "unicycle"
@@ -93,7 +94,7 @@ def plant_page(
     """
     lines = ["# What physics changes", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ]
     lines += ["## What would a kinematic simulator have told wrongly?", "", *_verdicts(found)]
-    lines += ["## Does the ranking hold?", "", *_ranking(found)]
+    lines += ["## Does the ranking hold?", "", *ranking_lines(found)]
     for own in found:
         lines += [f"## {own.recording}", "", *figures[own.recording]]
         for scenario in own.scenarios:
@@ -126,22 +127,6 @@ def _how_many(found: Sequence[Comparison]) -> str:
     )
     chance = f"were nothing told wrongly, chance would show some {0.05 * possible:.0f}"
     return f"Told wrongly: {made} of {possible} numbers; {chance}."
-
-
-def _ranking(found: Sequence[Comparison]) -> list[str]:
-    rows = [
-        [
-            own.recording,
-            SCENARIO_TITLES.get(scenario, scenario),
-            measure.replace("_", " "),
-            *(tau_cell(own.taus[scenario, other.name, measure]) for other in own.conditions[1:]),
-        ]
-        for own in found
-        for scenario in own.scenarios
-        for measure in dict.fromkeys(key[2] for key in own.taus)
-    ]
-    names = [condition.name for condition in found[0].conditions[1:]]
-    return table(["recording", "scenario", "ranked by", *(f"Kendall's tau, {name}" for name in names)], rows)
 
 
 def _scenario(own: Comparison, scenario: str) -> list[str]:

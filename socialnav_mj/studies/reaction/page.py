@@ -5,11 +5,12 @@ from typing import Any
 
 from socialnav_mj.report.intervals import ONE_RECORDING
 from socialnav_mj.report.markdown import interval, table
-from socialnav_mj.studies.cells import interval_cell, mean_cell, tau_cell
+from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.conditions import Comparison
 from socialnav_mj.studies.files import traceability
 from socialnav_mj.studies.kendall import EXPLAINED
 from socialnav_mj.studies.looks import SCENARIO_TITLES
+from socialnav_mj.studies.ranking import ranking_lines
 from socialnav_mj.studies.slopes import ORDER_OF_PANELS
 
 _HOW_TO_READ = f"""\
@@ -35,29 +36,13 @@ def reaction_page(
         Markdown.
     """
     lines = ["# People who react", "", f"Command: `{provenance['command']}`", "", _HOW_TO_READ]
-    lines += ["## Does the ranking hold?", "", *_ranking(found)]
+    lines += ["## Does the ranking hold?", "", *ranking_lines(found)]
     lines += ["## How far controllers lie apart", "", *_spread(found)]
     for own in found:
         lines += [f"## {own.recording}", "", *figures[own.recording]]
         for scenario in own.scenarios:
             lines += [f"### {SCENARIO_TITLES.get(scenario, scenario)}", "", *_scenario(own, scenario)]
     return "\n".join([*lines, *traceability(provenance, provenance["recordings"])]) + "\n"
-
-
-def _ranking(found: Sequence[Comparison]) -> list[str]:
-    measures = list(dict.fromkeys(measure for _, _, measure in found[0].taus))
-    names = [condition.name for condition in found[0].conditions[1:]]
-    rows = [
-        [
-            own.recording,
-            SCENARIO_TITLES.get(scenario, scenario),
-            *(tau_cell(own.taus[scenario, name, measure]) for measure in measures for name in names),
-        ]
-        for own in found
-        for scenario in own.scenarios
-    ]
-    heads = [f"Kendall's tau by {measure.replace('_', ' ')}, {name}" for measure in measures for name in names]
-    return table(["recording", "scenario", *heads], rows)
 
 
 def _spread(found: Sequence[Comparison]) -> list[str]:
