@@ -198,6 +198,7 @@ class Replay:
         # After the last person's end comes one more step, an empty scene, for all the time after.
         self._steps = int(cast.pedestrian_last_step.max(initial=-1)) + 1
         self._windows: dict[int, _Window] = {}
+        self._crowds: dict[int, SlotCrowd] = {}
 
     def _window_of(self, step: int) -> tuple[_Window, int]:
         """The window that a control step is in, and its row there; of the others the latest is kept."""
@@ -243,10 +244,13 @@ class Replay:
         Returns:
             A row for every pedestrian slot; its arrays are views of this object's and must not be written to.
         """
+        if step in self._crowds:
+            return self._crowds[step]
         within = min(step, self._steps)
         window, row = self._window_of(within)
         pedestrian = window.pedestrian[row]
-        return SlotCrowd(
+        self._crowds = {k: crowd for k, crowd in self._crowds.items() if k == step - 1}
+        self._crowds[step] = SlotCrowd(
             pedestrian=pedestrian,
             position=window.position[row * self._count],
             velocity=window.velocity[row * self._count],
@@ -255,6 +259,7 @@ class Replay:
             present=np.flatnonzero(pedestrian != NOBODY),
             changed=np.flatnonzero(window.changed[row] & (step == within)),
         )
+        return self._crowds[step]
 
     def begin(self) -> None:
         """Nothing: a replay is the same every time."""

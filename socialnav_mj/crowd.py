@@ -96,14 +96,13 @@ class ReactingCrowd:
         if then.changed.size:
             following = following.copy()
             following[then.changed] = np.nan
-        w, z = now.quaternion[:, 0], now.quaternion[:, 3]
         # Whoever is not there is NaN, and so meets nobody.
         self._after = deviate(
             self._before,
             people=Movers(position=people.position, velocity=people.velocity),
             recorded=Movers(position=now.position, velocity=now.velocity),
             following=following,
-            facing=(w * w - z * z, 2.0 * w * z),
+            facing=now.quaternion,
             robots=robots,
             strength=self._strength,
             timestep=self._timestep,
@@ -125,7 +124,8 @@ class ReactingCrowd:
         last, self._walk = self._walk, self._still
         if not known.any():
             return position, velocity, walk
-        offset, drift = np.split(np.einsum("kt,kmd->tmd", self._shares, known), 2)
+        moved = np.einsum("kt,kmd->tmd", self._shares, known)
+        offset, drift = moved[: len(moved) // 2], moved[len(moved) // 2 :]
         if walk is not None:
             steps = np.diff(offset, axis=0) / self._fine
             walk = walk + np.concatenate([last[None], steps])
@@ -134,7 +134,7 @@ class ReactingCrowd:
 
     def _stayed(self, deviation: Deviation, people: SlotCrowd) -> Deviation:
         """A deviation without that of people who have left; who comes is on the track."""
-        if not np.any(deviation.offset[people.changed]) and not np.any(deviation.drift[people.changed]):
+        if not people.changed.size:
             return deviation
         offset, drift = deviation.offset.copy(), deviation.drift.copy()
         offset[people.changed], drift[people.changed] = 0.0, 0.0

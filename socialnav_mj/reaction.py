@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import exp, hypot, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialnav_mj.episode import IntArray
 from socialnav_mj.geometry import Array
@@ -84,10 +85,10 @@ class Deviation:
     @property
     def rows(self) -> IntArray:
         """Who deviates, ascending."""
-        return np.flatnonzero(self.offset.any(axis=1) | self.drift.any(axis=1))
+        return np.flatnonzero(_is_moved(self.offset) | _is_moved(self.drift))
 
 
-def push(people: Movers, others: Movers, *, distance: float, facing: tuple[Array, Array] | None = None) -> Array:
+def push(people: Movers, others: Movers, *, distance: float, facing: Array | None = None) -> Array:
     """Acceleration away from predicted collisions, for k = 1: minus the gradient of exp(-tau / tau_0) / tau^2.
 
     With x and v from the other to the person, n = x + v tau and s = sqrt((x v)^2 - v^2 (x^2 - R^2)) it is
@@ -97,7 +98,7 @@ def push(people: Movers, others: Movers, *, distance: float, facing: tuple[Array
         people: Who is pushed, m; arrays may have more axes in front, for several crowds at once.
         others: Who is avoided, k, with the same axes in front. The same body at the same place does not count.
         distance: R between centres that counts as a collision [m].
-        facing: Cosines and sines of the headings, each (m,): others out of sight count less; None if all count alike.
+        facing: Quaternions of the headings, shape (m, 4): others out of sight count less; None if all count alike.
 
     Returns:
         The shape of people's positions; exactly 0 for who meets nobody within `HORIZON` [m/s^2 per m^2].
@@ -112,8 +113,10 @@ def push(people: Movers, others: Movers, *, distance: float, facing: tuple[Array
     limit = distance * distance
     meets &= across * across < limit * (v_0 * v_0 + v_1 * v_1)
     result = np.zeros_like(people.position)
-    # There are few, and for few the C library's numbers, one after the other, are faster than arrays.
     pairs = np.nonzero(meets)
+    if not pairs[0].size:
+        return result
+    # There are few, and for few the C library's numbers, one after the other, are faster than arrays.
     rows = zip(*(index.tolist() for index in pairs[:-1]), strict=True)
     for row, a, b, c, d in zip(rows, *(values[pairs].tolist() for values in (x_0, x_1, v_0, v_1)), strict=True):
         square, speed, approach = a * a + b * b, c * c + d * d, a * c + b * d
@@ -129,7 +132,8 @@ def push(people: Movers, others: Movers, *, distance: float, facing: tuple[Array
         size = exp(-late / SCREENING_TIME) / (late * late) * (2.0 / late + 1.0 / SCREENING_TIME)
         size /= max(root, _SHARPEST * sqrt(speed * kept))
         if facing is not None:
-            seen = -(a * float(facing[0][row]) + b * float(facing[1][row])) >= SIGHT_COSINE * sqrt(square)
+            w, _, _, z = facing[row].tolist()
+            seen = -(a * (w * w - z * z) + b * (2.0 * w * z)) >= SIGHT_COSINE * sqrt(square)
             size *= 1.0 if seen else UNSEEN
         result[row] += (size * (a + c * time), size * (b + d * time))
     return result
@@ -141,7 +145,7 @@ def deviate(
     people: Movers,
     recorded: Movers,
     following: Array,
-    facing: tuple[Array, Array],
+    facing: Array,
     robots: Movers,
     strength: float,
     timestep: float,
@@ -155,7 +159,7 @@ def deviate(
         people: Where they are; NaN for who is not there.
         recorded: Where the recording has them.
         following: Where it has them one step later, shape (m, 2); NaN for who will have left [m].
-        facing: Cosines and sines of their headings, each (m,).
+        facing: Quaternions of their headings, shape (m, 4).
         robots: To which they react.
         strength: k [m^2].
         timestep: Of the control step [s].
@@ -166,26 +170,32 @@ def deviate(
         The deviation then; exactly 0 for whom no robot has pushed off its track, or who is back on it.
     """
     pushed = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
-    by_robots = np.any(pushed, axis=1)
-    rows = np.flatnonzero(by_robots | deviation.offset.any(axis=1) | deviation.drift.any(axis=1))
+    by_robots = _is_moved(pushed)
+    rows = np.flatnonzero(by_robots | _is_moved(deviation.offset) | _is_moved(deviation.drift))
     if not rows.size:
         return deviation
-    force = pushed.copy()
-    noticing = rows[np.abs(deviation.offset[rows]).max(axis=1) > NOTICE]
-    if noticing.size:
+    force, offsets = pushed, deviation.offset[rows].tolist()
+    noticing = [row for row, (x, y) in zip(rows.tolist(), offsets, strict=True) if max(abs(x), abs(y)) > NOTICE]
+    if noticing:
         # Of the others it takes notice as far as the deviation changes what they are to it: they are in the recording.
-        place, pace = (np.array((getattr(people, name), getattr(recorded, name))) for name in ("position", "velocity"))
+        place, pace = np.array((people.position, recorded.position)), np.array((people.velocity, recorded.velocity))
         own = Movers(position=place[:, noticing], velocity=pace[:, noticing])
         by_people = push(own, Movers(position=place, velocity=pace), distance=body)
         force[noticing] += strength * (by_people[0] - by_people[1])
-    values = (deviation.offset[rows], deviation.drift[rows], force[rows], recorded.velocity[rows], by_robots[rows])
+    values = (deviation.drift[rows], force[rows], recorded.velocity[rows], by_robots[rows])
     listed = (value.tolist() for value in values)
-    after = [_stepped(o, d, f, w, p, timestep) for o, d, f, w, p in zip(*listed, strict=True)]
+    after = [_stepped(o, d, f, w, p, timestep) for o, d, f, w, p in zip(offsets, *listed, strict=True)]
     result = Deviation(offset=deviation.offset.copy(), drift=deviation.drift.copy())
     both = np.array(after)
     result.offset[rows], result.drift[rows] = both[:, :2], both[:, 2:]
     _part(result, rows, following, body=body, timestep=timestep)
     return result
+
+
+def _is_moved(values: Array) -> NDArray[np.bool_]:
+    """Which rows of (m, 2) are not exactly 0, NaN among them; faster than `any` on so few."""
+    moved: NDArray[np.bool_] = (values[:, 0] != 0.0) | (values[:, 1] != 0.0)
+    return moved
 
 
 Pair = tuple[float, float]
@@ -215,12 +225,14 @@ def _limited(x: float, y: float, limit: float) -> Pair:
 
 def _part(deviation: Deviation, rows: IntArray, following: Array, *, body: float, timestep: float) -> None:
     """Move apart, in place, who would be nearer than a body is wide, and nearer than the recording has them."""
-    offset, before = deviation.offset, deviation.offset[rows].copy()
+    offset = deviation.offset
     there = following + offset
-    now = there[rows][:, None] - there
-    # Everybody is near itself, unless it will have left.
-    if np.count_nonzero(now[..., 0] ** 2 + now[..., 1] ** 2 < body * body) <= np.isfinite(there[rows, 0]).sum():
+    own = there[rows]
+    x, y = own[:, :1] - there[:, 0], own[:, 1:] - there[:, 1]
+    # Everybody is near itself, unless it will have left, and then is NaN.
+    if np.count_nonzero(x * x + y * y < body * body) <= np.count_nonzero(own[:, 0] == own[:, 0]):
         return
+    before = offset[rows]
     gap = following[rows][:, None] - following
     least = np.minimum(np.hypot(gap[..., 0], gap[..., 1]), body)
     least[np.arange(len(rows)), rows] = np.nan

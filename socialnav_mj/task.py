@@ -268,8 +268,7 @@ class CrowdTask(base.Task):
 
     def _note_collisions(self, physics: Physics) -> list[int]:
         """Translate new touches from slots to people; slots of the agents struck in this step, once a touch."""
-        present = self._crowd.crowd(self.step - 1).pedestrian
-        new = collisions_of(physics.new_touches(), agent=self._slot_agent, pedestrian=present)
+        new = collisions_of(physics.new_touches(), agent=self._slot_agent, pedestrian=self.people.pedestrian)
         self.collisions += new
         struck = [slot for collision in new for slot in collision.agent_slots]
         for slot in struck:

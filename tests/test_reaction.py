@@ -8,7 +8,7 @@ from socialnav_mj import suite
 from socialnav_mj.controllers import GoStraight
 from socialnav_mj.controllers.stand_still import StandStill
 from socialnav_mj.elementary import exp
-from socialnav_mj.geometry import Array
+from socialnav_mj.geometry import Array, quaternion_of_yaw
 from socialnav_mj.reaction import (
     CLEARANCE,
     HORIZON,
@@ -71,8 +71,8 @@ def test_push_turns_with_the_scene_and_out_of_sight_counts_less() -> None:
     plain = push(movers(person), movers(robot), distance=0.42)[0]
     turned = push(movers((0, 0, 0, 1)), movers((-0.2, 2.0, 0, -0.5)), distance=0.42)[0]
     np.testing.assert_allclose(turned, [-plain[1], plain[0]], rtol=1e-12)
-    for facing, factor in (((1.0, 0.0), 1.0), ((0.0, 1.0), 1.0), ((-1.0, 0.0), UNSEEN)):
-        seen = push(movers(person), movers(robot), distance=0.42, facing=tuple(np.array([[facing[0]], [facing[1]]])))[0]
+    for yaw, factor in ((0.0, 1.0), (0.5 * np.pi, 1.0), (np.pi, UNSEEN)):
+        seen = push(movers(person), movers(robot), distance=0.42, facing=quaternion_of_yaw([yaw]))[0]
         np.testing.assert_allclose(seen, factor * plain, rtol=1e-12)
 
 
@@ -83,7 +83,7 @@ def walked(
     recorded, machine = movers(*people), movers(*robots)
     deviation = Deviation.none(len(people))
     offsets, drifts = [deviation.offset], [deviation.drift]
-    heading = recorded.velocity / np.maximum(np.linalg.norm(recorded.velocity, axis=1), 1e-9)[:, None]
+    facing = quaternion_of_yaw(np.arctan2(recorded.velocity[:, 1], recorded.velocity[:, 0]))
     for k in range(steps):
         there = Movers(position=recorded.position + 0.2 * k * recorded.velocity, velocity=recorded.velocity)
         robot = Movers(position=machine.position + 0.2 * k * machine.velocity, velocity=machine.velocity)
@@ -92,7 +92,7 @@ def walked(
             people=Movers(position=there.position + deviation.offset, velocity=there.velocity + deviation.drift),
             recorded=there,
             following=there.position + 0.2 * recorded.velocity,
-            facing=(heading[:, 0], heading[:, 1]),
+            facing=facing,
             robots=robot,
             strength=strength,
             timestep=0.2,

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.stats import ks_2samp
 
 from socialnav_mj.config import Scenario
-from socialnav_mj.elementary import cos, sin
 from socialnav_mj.files import write_whole
-from socialnav_mj.geometry import Array
+from socialnav_mj.geometry import Array, quaternion_of_yaw
 from socialnav_mj.reaction import STRENGTH, Deviation, Movers, deviate
 from socialnav_mj.recorder import recorded_series
 from socialnav_mj.recordings import Recording
@@ -78,7 +77,7 @@ def people_as_robots(recording: Recording, strength: float, *, late: float = 0.0
     steps = int(last.max()) + 1
     place, velocity, heading = recorded_series(recording, np.arange(n), first, last, (0, steps), dt)
     angle = np.nan_to_num(heading)
-    cosine, sine = cos(angle), sin(angle)
+    facing = quaternion_of_yaw(angle)
     way = np.linalg.norm(recording.end - recording.start, axis=1)
     players = np.flatnonzero((last - first >= _SHORTEST) & (way >= scenario.minimum_displacement))
     moved, speeds, nearest = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros((2, 0))]
@@ -95,7 +94,7 @@ def people_as_robots(recording: Recording, strength: float, *, late: float = 0.0
                 people=Movers(position=recorded.position + own.offset, velocity=recorded.velocity + own.drift),
                 recorded=recorded,
                 following=place[k + 1, rows],
-                facing=(cosine[k, rows], sine[k, rows]),
+                facing=facing[k, rows],
                 robots=Movers(position=place[k - shift, [player]], velocity=velocity[k - shift, [player]]),
                 strength=strength,
                 timestep=dt,
