@@ -1,8 +1,9 @@
 """What an episode costs beside the bare physics: measured side by side in one run, as ratios."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from math import ceil
 from pathlib import Path
 from statistics import median
@@ -13,8 +14,9 @@ import mujoco
 import numpy as np
 from dm_control.rl import control
 
-from socialnav_mj.config import SHARES, Scenario
+from socialnav_mj.config import SHARES, Pedestrians, Scenario
 from socialnav_mj.controllers import Limits, make_controller
+from socialnav_mj.crowd import ReactingCrowd
 from socialnav_mj.environment import build_environment, make_environment
 from socialnav_mj.physics import Physics
 from socialnav_mj.recordings import Recording
@@ -51,6 +53,8 @@ class Cost:
     """The greatest."""
     parked_ratio: float
     """Bare `mj_step` calls of the scene as it was built, robots parked in it, over physics_cpu; the median."""
+    reaction_ratio: float
+    """What people who react take besides their replay, over physics_cpu; the median. 0 if nobody does."""
     real_time_factor: float
     """simulated_time / episode_cpu."""
     save_share: float
@@ -61,7 +65,15 @@ class Cost:
     """Size of the trace."""
 
 
-def measure(recording: Recording, scenario: str, *, controller: str, seed: int = 0, repetitions: int = 3) -> Cost:
+def measure(
+    recording: Recording,
+    scenario: str,
+    *,
+    controller: str,
+    pedestrians: Pedestrians = Scenario.pedestrians,
+    seed: int = 0,
+    repetitions: int = 3,
+) -> Cost:
     """Cost of one scenario on one core.
 
     Bare steps are taken from the episode's own states: before each control step the state, the commands and the slots'
@@ -71,6 +83,7 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
         recording: Crowd in which the episodes are run.
         scenario: Name of a task.
         controller: As `make_controller` takes it.
+        pedestrians: Whether people react, as in `Scenario`.
         seed: Seed of the draw.
         repetitions: Episodes and bare runs, in turn.
 
@@ -79,20 +92,27 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
     """
     from socialnav_mj.trace.writer import write_trace  # rerun is slow to import and not needed elsewhere
 
-    setting = Scenario(share=SHARES[scenario], seed=seed)
+    setting = Scenario(share=SHARES[scenario], seed=seed, pedestrians=pedestrians)
     environment = build_environment(recording, setting, robots="likely")
     whole_states = _record_states(environment, controller)
     n_used = max(state["n_used"] for state in whole_states)
     bare = build_environment(recording, setting, robots=n_used)
     states = _record_states(bare, controller)
-    episode_times, physics_times, whole_times, save_times, trace_times = [], [], [], [], []
+    episode_times, physics_times, whole_times, reaction_times, save_times, trace_times = [], [], [], [], [], []
+    crowd = environment.task.crowd
+    is_reacting = isinstance(crowd, ReactingCrowd)
+    reacting = _clock(crowd, "react", "motion", "crowd") if is_reacting else []
+    replaying = _clock(crowd.replay, "motion", "crowd") if is_reacting else []
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "trace.rrd"
         write_trace(rollout(environment, make_controller(controller)), trace)  # warms everything up
         for _ in range(repetitions):
+            reacting.clear()
+            replaying.clear()
             begin = process_time()
             episode = rollout(environment, make_controller(controller), scenario_name=scenario)
             episode_times.append(process_time() - begin)
+            reaction_times.append(sum(reacting) - sum(replaying))
             physics_times.append(_time_bare_steps(bare, states))
             whole_times.append(_time_bare_steps(environment, whole_states))
             begin = process_time()
@@ -118,11 +138,31 @@ def measure(recording: Recording, scenario: str, *, controller: str, seed: int =
         ratio_low=min(ratios),
         ratio_high=max(ratios),
         parked_ratio=median(w / p for w, p in zip(whole_times, physics_times, strict=True)),
+        reaction_ratio=median(r / p for r, p in zip(reaction_times, physics_times, strict=True)),
         real_time_factor=float(episode.time[-1]) / median(episode_times),
         save_share=median(s / e for s, e in zip(save_times, episode_times, strict=True)),
         trace_share=median(t / e for t, e in zip(trace_times, episode_times, strict=True)),
         trace_megabytes=size,
     )
+
+
+def _clock(owner: object, *methods: str) -> list[float]:
+    """Time every call of an object's methods from now on; the list gets the CPU times [s]."""
+    times: list[float] = []
+
+    def timed(method: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(method)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            begin = process_time()
+            result = method(*args, **kwargs)
+            times.append(process_time() - begin)
+            return result
+
+        return call
+
+    for name in methods:
+        setattr(owner, name, timed(getattr(owner, name)))
+    return times
 
 
 @dataclass(frozen=True, kw_only=True)

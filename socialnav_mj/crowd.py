@@ -25,7 +25,8 @@ class ReactingCrowd:
             replay: What the recording says; it is not changed.
             scenario: Gives the strength, the radii and the time steps.
         """
-        self._replay = replay
+        self.replay = replay
+        """The recording's people."""
         self._strength = STRENGTH[scenario.pedestrians]
         self._distance, self._body = scenario.contact_distance, 2.0 * scenario.pedestrian_radius
         self._timestep, self._fine = scenario.control_timestep, scenario.physics_timestep
@@ -49,7 +50,7 @@ class ReactingCrowd:
 
     def begin(self) -> None:
         """Put everybody back on the track of the recording's beginning."""
-        people = self._replay.crowd(0)
+        people = self.replay.crowd(0)
         self._step = 0
         self._before = self._after = Deviation.none(len(people.pedestrian))
         self._walk = self._still = np.zeros((len(people.pedestrian), 2))
@@ -63,7 +64,7 @@ class ReactingCrowd:
         Returns:
             As `Replay.crowd`, off the tracks.
         """
-        recorded = self._replay.crowd(step)
+        recorded = self.replay.crowd(step)
         if step == self._step:
             deviation = self._before
         elif step == self._step + 1:
@@ -84,7 +85,7 @@ class ReactingCrowd:
             people: Where they are.
             robots: That are under way.
         """
-        now, then = self._replay.crowd(step), self._replay.crowd(step + 1)
+        now, then = self.replay.crowd(step), self.replay.crowd(step + 1)
         if step != self._step:
             self._before = self._stayed(self._after, now)
             if now.changed.size and self._walk is not self._still:
@@ -119,7 +120,7 @@ class ReactingCrowd:
         Returns:
             As `Replay.motion`, off the tracks.
         """
-        position, velocity, walk = self._replay.motion(step)
+        position, velocity, walk = self.replay.motion(step)
         known = np.array((self._before.offset, self._before.drift, self._after.offset, self._after.drift))
         last, self._walk = self._walk, self._still
         if not known.any():

@@ -59,7 +59,8 @@ class CrowdTask(base.Task):
         self.recording = recording
         self.scenario = scenario
         self.cast: Cast = cast_recording(recording, scenario, replaced=replaced)
-        self._crowd = crowd_of(recording, scenario, self.cast)
+        self.crowd = crowd_of(recording, scenario, self.cast)
+        """How the people move."""
         self.neighbours: Neighbours | None = None
         """How many of the nearest an agent is shown, and how near; None for all. See `socialnav_mj.observation`."""
         self._clear()
@@ -77,8 +78,8 @@ class CrowdTask(base.Task):
         self._goal_distance = np.zeros(slots)
         self._reward = np.zeros(slots)
         self._sample = Sample.nobody(slots)
-        self._crowd.begin()
-        self.people = self._crowd.crowd(0)
+        self.crowd.begin()
+        self.people = self.crowd.crowd(0)
 
     @property
     def time(self) -> float:
@@ -150,8 +151,8 @@ class CrowdTask(base.Task):
         under_way = self._slot_agent != NOBODY
         physics.set_twist(twist_of_action(action, under_way, self.scenario, time=self.time))
         robots = Movers(position=self._sample.position[under_way], velocity=self._sample.velocity[under_way])
-        self._crowd.react(self.step, self.people, robots)
-        physics.set_pedestrian_path(*self._crowd.motion(self.step))
+        self.crowd.react(self.step, self.people, robots)
+        physics.set_pedestrian_path(*self.crowd.motion(self.step))
 
     def after_step(self, physics: Physics) -> None:
         """Advance the clock; end runs, let people and agents in, and account for all of it.
@@ -232,7 +233,7 @@ class CrowdTask(base.Task):
 
     def _update_pedestrians(self, physics: Physics) -> None:
         """Place people at the current step; whoever appears on a robot stays contact-free until clear of all robots."""
-        now = self._crowd.crowd(self.step)
+        now = self.crowd.crowd(self.step)
         if now.changed.size:
             physics.park_pedestrians(now.changed)
         there = now.present

@@ -533,7 +533,8 @@ def test_data_fetch_downloads_into_the_folder_that_is_given(capsys, tmp_path, mo
 
 
 def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
-    main(["bench", "--dataset", TINY, "--scenarios", "4", "--repetitions", "2", "--out", "bench.json"])
+    command = ["bench", "--dataset", TINY, "--scenarios", "4", "--repetitions", "2", "--pedestrians", "yielding"]
+    main([*command, "--out", "bench.json"])
     output = capsys.readouterr().out
     assert "episode / mj_step" in output and "real-time factor" in output and "trace [MB]" in output
     content = json.loads(Path("bench.json").read_text())
@@ -541,6 +542,8 @@ def test_bench_prints_and_writes_the_cost_beside_bare_steps(capsys):
     assert cost["scenario"] == "scenario_4" and cost["n_agents"] == 3
     assert cost["ratio_low"] <= cost["ratio"] <= cost["ratio_high"]
     assert "as built, with parked / mj_step" in output and cost["parked_ratio"] > 0.0
+    assert "people's reaction / mj_step" in output and cost["reaction_ratio"] > 0.0
+    assert content["settings"]["pedestrians"] == "yielding"
     assert cost["real_time_factor"] == pytest.approx(cost["simulated_time"] / cost["episode_cpu"])
     assert content["recording"]["name"] == "tiny" and "mujoco" in content["versions"]
 

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from socialnav_mj.cli.arguments import LOCAL, Folder, Scenarios, Where
 from socialnav_mj.cli.console import console, errors, follow, say
+from socialnav_mj.config import Pedestrians, Scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +79,8 @@ class Bench:
     """Scenarios to measure."""
     controller: str = "potential_field"
     """Name, or package.module:Class, with settings if need be, as in `evaluate`."""
+    pedestrians: Pedestrians = Scenario.pedestrians
+    """Whether people react to robots."""
     controllers: tuple[str, ...] = ()
     """Controllers whose own cost for 60 agents is measured, in a made-up crowd; then no episodes are."""
     growth: tuple[int, ...] = ()
@@ -228,6 +231,7 @@ class Bench:
                     recording,
                     f"scenario_{number}",
                     controller=self.controller,
+                    pedestrians=self.pedestrians,
                     seed=self.seed,
                     repetitions=self.repetitions,
                 )
@@ -246,6 +250,7 @@ class Bench:
                 "episode / mj_step": f"{cost.ratio:.2f} ({cost.ratio_low:.2f} to {cost.ratio_high:.2f})",
                 "real-time factor": f"{cost.real_time_factor:.1f}",
                 "as built, with parked / mj_step": f"{cost.parked_ratio:.2f}",
+                "people's reaction / mj_step": f"{cost.reaction_ratio:.2f}",
                 "saving / episode": f"{cost.save_share:.1%}",
                 "trace / episode": f"{cost.trace_share:.1%}",
                 "trace [MB]": f"{cost.trace_megabytes:.2f}",
@@ -254,7 +259,7 @@ class Bench:
         for label, cells in rows.items():
             table.add_row(label, *cells)
         console.print(table)
-        settings = {"controller": self.controller, "seed": self.seed}
+        settings = {"controller": self.controller, "pedestrians": self.pedestrians, "seed": self.seed}
         measured = {"settings": settings, "costs": [asdict(cost) for cost in costs]}
         self._write({"recording": recording_metadata(recording), **measured})
 
