@@ -67,7 +67,7 @@ def test_who_meets_nobody_is_within_a_millimetre_of_the_recording(control_timest
         time_step = environment.step(still(environment))
         if time_step.last():
             break
-        recorded, there = task._crowd.crowd(task.step), task.people.present
+        recorded, there = task.crowd.crowd(task.step), task.people.present
         lag = np.linalg.norm(task.people.position[there] - recorded.position[there], axis=1)
         worst = max(worst, float(lag.max(initial=0.0)))
     assert 0.0 < worst < 1e-3
@@ -166,7 +166,7 @@ def test_episode_and_observation_tell_where_the_bodies_are() -> None:
     for _ in range(15):
         seen = environment.step(still(environment)).observation
     people = environment.task.people
-    recorded = environment.task._crowd.crowd(15)
+    recorded = environment.task.crowd.crowd(15)
     assert np.linalg.norm(people.position - recorded.position, axis=1).min() > 0.5
     assert np.linalg.norm(people.velocity, axis=1).max() < 0.1
     gaps = np.linalg.norm(seen["pedestrian_position"][0][seen["pedestrian_mask"][0]], axis=-1)

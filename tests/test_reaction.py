@@ -198,7 +198,7 @@ def test_bodies_go_where_people_want_without_a_jump(body) -> None:
         bodies = environment.physics.pedestrian_position()
         np.testing.assert_allclose(bodies[now.present], now.position[now.present], atol=1e-9)
         before = now
-    wanted = environment.task._crowd.crowd(30)
+    wanted = environment.task.crowd.crowd(30)
     np.testing.assert_allclose(now.position, wanted.position, atol=0.01)
 
 
