@@ -97,7 +97,7 @@ def _draw_panel(axes: Axes, comparison: Comparison, controller: str, measure: st
     axes.set_title(fill(controller, _LETTERS_OF_A_TITLE), fontsize=7.0)
     axes.set_xlim(-0.35, places[-1] + 0.35)
     axes.set_xticks(places, [""] * len(places))
-    axes.yaxis.set_major_locator(MaxNLocator(4, min_n_ticks=3))
+    axes.yaxis.set_major_locator(MaxNLocator(4, min_n_ticks=3, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(labelsize=6.5)
 
 
