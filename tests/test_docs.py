@@ -20,6 +20,7 @@ from test_architecture import ROOT
 
 from socialnav_mj import cli
 from socialnav_mj.cli.arguments import Where
+from socialnav_mj.studies.study import CONTROLLERS
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
@@ -273,3 +274,31 @@ def test_readmes_results_are_the_published_ones():
     claims = (folder / "README.md").read_text(encoding="utf-8")
     assert re.search(r"\| \(a\) \|.*mixed policy has the highest success.*\*\*fails\*\*", claims)
     assert re.search(r"\| \(b3\) \|.*Potential field agents intrude most.*\*\*holds\*\*", claims)
+
+
+def test_readmes_words_on_people_and_physics_are_the_published_ones():
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    with (ROOT / "results" / "reaction" / "tables" / "levels.csv").open(encoding="utf-8") as file:
+        levels = [r for r in csv.DictReader(file) if (r["recording"], r["measure"]) == ("students003", "success")]
+    assert {row["controller"] for row in levels} == {*CONTROLLERS} and "nineteen controllers" in text
+
+    def ends(scenario: str, condition: str) -> list[tuple[str, str]]:
+        rows = [row for row in levels if (row["scenario"], row["condition"]) == (scenario, condition)]
+        rows.sort(key=lambda row: float(row["mean"]))
+        return [
+            (f"{float(row['mean']):.3f}".removeprefix("0"), f"`{row['controller']}`") for row in (rows[0], rows[-1])
+        ]
+
+    (low, worst), (high, best) = ends("scenario_1", "replay")
+    then = " to ".join(value for value, _ in ends("scenario_1", "yielding"))
+    assert f"success of {low} ({worst}) to {high} ({best}) becomes {then}," in text
+    last = [" to ".join(value for value, _ in ends("scenario_4", condition)) for condition in ("replay", "yielding")]
+    assert f"{' becomes '.join(last)}." in text
+    page = (ROOT / "results" / "plant" / "README.md").read_text(encoding="utf-8")
+    told, possible, chance = re.search(r"Told wrongly: (\d+) of (\d+) numbers; .* some (\d+)\.", page).groups()
+    assert f"tells {told} of {possible} numbers wrongly, where chance would {chance}:" in text
+    with (ROOT / "results" / "plant" / "tables" / "turned_over.csv").open(encoding="utf-8") as file:
+        turned = Counter((row["condition"], row["measure"]) for row in csv.DictReader(file))
+    assert f"but {turned['unicycle', 'time_under_way']} by time." in text
+    assert f"changes {turned['heavy', 'success']} by success" in text
+    assert not turned["unicycle", "success"] and not turned["slippery", "success"]
