@@ -284,10 +284,8 @@ def test_readmes_words_on_people_and_physics_are_the_published_ones():
 
     def ends(scenario: str, condition: str) -> list[tuple[str, str]]:
         rows = [row for row in levels if (row["scenario"], row["condition"]) == (scenario, condition)]
-        rows.sort(key=lambda row: float(row["mean"]))
-        return [
-            (f"{float(row['mean']):.3f}".removeprefix("0"), f"`{row['controller']}`") for row in (rows[0], rows[-1])
-        ]
+        least, most = (choose(rows, key=lambda row: float(row["mean"])) for choose in (min, max))
+        return [(f"{float(row['mean']):.3f}".removeprefix("0"), f"`{row['controller']}`") for row in (least, most)]
 
     (low, worst), (high, best) = ends("scenario_1", "replay")
     then = " to ".join(value for value, _ in ends("scenario_1", "yielding"))
