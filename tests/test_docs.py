@@ -297,6 +297,7 @@ def test_readmes_words_on_people_and_physics_are_the_published_ones():
     assert f"tells {told} of {possible} numbers wrongly, where chance would {chance}:" in text
     with (ROOT / "results" / "plant" / "tables" / "turned_over.csv").open(encoding="utf-8") as file:
         turned = Counter((row["condition"], row["measure"]) for row in csv.DictReader(file))
-    assert f"but {turned['unicycle', 'time_under_way']} by time." in text
-    assert f"changes {turned['heavy', 'success']} by success" in text
-    assert not turned["unicycle", "success"] and not turned["slippery", "success"]
+    assert f"and {turned['unicycle', 'time_under_way']} by time." in text
+    assert f"turns {turned['heavy', 'success']} over by success" in text
+    assert turned["unicycle", "success"] == 2 and "turns two over by success" in text
+    assert not turned["slippery", "success"] and "turns no pair over by success" in text
