@@ -347,9 +347,10 @@ class Other(GoStraight):
 @pytest.mark.parametrize("study", ["leaderboard", "reaction"])
 def test_a_controller_of_a_users_own_joins_under_whatever_name_it_gives_itself(study, tmp_path, monkeypatch, capsys):
     """Its class calls it go_straight, or other_name, and so do its episodes; the board, as it was asked for."""
-    (tmp_path / "mine.py").write_text(OWN)
+    module = f"joins_{study}"
+    (tmp_path / f"{module}.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
-    names = ["mine:Mine", "mine:Other", "potential_field"]
+    names = [f"{module}:Mine", f"{module}:Other", "potential_field"]
     command = [study, "--recordings", TINY, "--scenarios", "4", "--draws", "3", "--jobs", "1", "--out", "out"]
     main([*command, "--controllers", *names])
     table = "leaderboard" if study == "leaderboard" else "levels"
