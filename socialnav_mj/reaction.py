@@ -169,12 +169,12 @@ def deviate(
     Returns:
         The deviation then; exactly 0 for whom no robot has pushed off its track, or who is back on it.
     """
-    pushed = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
-    by_robots = _is_moved(pushed)
+    force = strength * push(people, robots, distance=distance + CLEARANCE, facing=facing)
+    by_robots = _is_moved(force)
     rows = np.flatnonzero(by_robots | _is_moved(deviation.offset) | _is_moved(deviation.drift))
     if not rows.size:
         return deviation
-    force, offsets = pushed, deviation.offset[rows].tolist()
+    offsets = deviation.offset[rows].tolist()
     noticing = [row for row, (x, y) in zip(rows.tolist(), offsets, strict=True) if max(abs(x), abs(y)) > NOTICE]
     if noticing:
         # Of the others it takes notice as far as the deviation changes what they are to it: they are in the recording.

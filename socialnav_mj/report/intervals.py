@@ -13,7 +13,9 @@ LEAST = 3
 """Fewer draws give no interval, and fewer trainings none for other trainings."""
 ONE_RECORDING = "All intervals are over draws of one recording: they say nothing about another crowd."
 """What every page with intervals says."""
-_TAIL = 0.5 * (1.0 + CONFIDENCE)
+TAIL = 0.5 * (1.0 + CONFIDENCE)
+"""Probability below the upper end of an interval."""
+_STILL = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +106,21 @@ def interval_of(cells: Array, *, trained: bool = False, agents: int | None = Non
     )
 
 
+def told_apart(difference: Array, spread: Array, quantile: Array | float) -> NDArray[np.bool_]:
+    """Which differences draws tell from nothing; one that is the same in every draw says nothing of how it varies.
+
+    Args:
+        difference: Means, any shape.
+        spread: Their standard errors, of that shape.
+        quantile: Of t, beyond which they are told from nothing.
+
+    Returns:
+        Of that shape.
+    """
+    told: NDArray[np.bool_] = (spread > _STILL) & (np.abs(difference) > quantile * spread)
+    return told
+
+
 def combined(
     of_draws: Array | float,
     of_trainings: Array | float,
@@ -168,7 +185,7 @@ def reach(components: Components, n_draws: NDArray[np.int64], n_trainings: NDArr
     of_cells = components.cell / (n_draws * n_trainings)
     parts = (components.draw / n_draws + of_cells, components.training / n_trainings + of_cells, of_cells)
     variance, freedom = combined(*parts, n_draws, n_trainings)
-    return np.asarray(stdtrit(freedom, _TAIL) * np.sqrt(variance))
+    return np.asarray(stdtrit(freedom, TAIL) * np.sqrt(variance))
 
 
 def variance_parts(cells: Array) -> tuple[float, float, float]:
@@ -197,7 +214,7 @@ def _ends(mean: float, variance: Array, freedom: Array, agents: int | None) -> t
         return _wilson(min(max(mean, 0.0), 1.0), float(variance), float(freedom), agents)
     if variance <= _nothing(mean):
         return float("nan"), float("nan")
-    half = float(stdtrit(freedom, _TAIL) * np.sqrt(variance))
+    half = float(stdtrit(freedom, TAIL) * np.sqrt(variance))
     return mean - half, mean + half
 
 
@@ -205,7 +222,7 @@ def _wilson(share: float, variance: float, freedom: float, agents: int) -> tuple
     spread = share * (1.0 - share)
     known = spread > 0.0 and variance > _nothing(share)
     number = spread / variance if known else float(agents)
-    quantile = float(stdtrit(freedom if known else np.inf, _TAIL))
+    quantile = float(stdtrit(freedom if known else np.inf, TAIL))
     middle = (share + quantile**2 / (2.0 * number)) / (1.0 + quantile**2 / number)
     half = quantile * np.sqrt(spread / number + (0.5 * quantile / number) ** 2) / (1.0 + quantile**2 / number)
     return max(0.0, float(middle - half)), min(1.0, float(middle + half))

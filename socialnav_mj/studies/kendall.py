@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from socialnav_mj.geometry import Array
-from socialnav_mj.report.intervals import CONFIDENCE, LEAST
+from socialnav_mj.report.intervals import LEAST, TAIL, told_apart
 
 EXPLAINED = """\
 *Kendall's tau*: how alike two rankings of the controllers are, 1 for the same, -1 for the reverse; in brackets what \
@@ -15,7 +15,6 @@ it is if all pairs that draws do not tell apart in both rankings (paired t, 95 %
 then how many of the pairs that they tell apart in both have changed over.\
 """
 """How pages explain it."""
-_NOTHING = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +58,13 @@ def kendall(one: Array, two: Array) -> Tau:
     first, second = _orders(one), _orders(two)
     pairs = zip(*np.triu_indices(one.shape[1], 1), first, second, strict=True)
     turned_over = tuple((int(i), int(j)) if a > 0 else (int(j), int(i)) for i, j, a, b in pairs if a * b < 0)
-    told_apart = int(np.count_nonzero(first * second))
-    same = told_apart - len(turned_over)
+    n_told_apart = int(np.count_nonzero(first * second))
+    same = n_told_apart - len(turned_over)
     return Tau(
         mean=mean,
         low=min(2.0 * same / first.size - 1.0, mean),
         high=max(1.0 - 2.0 * len(turned_over) / first.size, mean),
-        told_apart=told_apart,
+        told_apart=n_told_apart,
         turned_over=turned_over,
     )
 
@@ -76,9 +75,7 @@ def _orders(values: Array) -> NDArray[np.int64]:
     gap, n = values[:, i] - values[:, j], len(values)
     spread = gap.std(axis=0, ddof=1) / np.sqrt(n)
     mean = gap.mean(axis=0)
-    # A difference that is the same in every draw says nothing of how it varies.
-    sure = (spread > _NOTHING) & (np.abs(mean) > stdtrit(n - 1, 0.5 * (1.0 + CONFIDENCE)) * spread)
-    return np.where(sure, np.sign(mean), 0.0).astype(np.int64)
+    return np.where(told_apart(mean, spread, float(stdtrit(n - 1, TAIL))), np.sign(mean), 0.0).astype(np.int64)
 
 
 def tau_b(one: Array, two: Array) -> Array:

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from socialnav_mj.geometry import Array
-from socialnav_mj.report.intervals import CONFIDENCE, LEAST, combined, variance_parts
+from socialnav_mj.report.intervals import CONFIDENCE, LEAST, combined, told_apart, variance_parts
 
 RESAMPLES = 4000
 """Of the draws, and simulated studies."""
-_NOTHING = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +69,7 @@ def rank(cells: Array, *, more_is_better: bool, seed: int = 0) -> Ranks:
             variance, quantile = _over_trainings(signed[:, :, i] - signed[:, :, j], beyond)
             spread[i, j] = spread[j, i] = max(spread[i, j], np.sqrt(variance))
             threshold[i, j] = threshold[j, i] = max(beyond, quantile)
-        better = (spread > _NOTHING) & (mean > threshold * spread)
+        better = told_apart(mean, spread, threshold) & (mean > 0.0)
     resampled = _resampled(signed, weights, np.random.default_rng(seed + 1))
     place = 1 + (resampled[:, None, :] > resampled[:, :, None] + 1e-12).sum(axis=2)
     return Ranks(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from socialnav_mj.report.intervals import ONE_RECORDING
+from socialnav_mj.report.intervals import CONFIDENCE, ONE_RECORDING
 from socialnav_mj.report.markdown import interval, table
 from socialnav_mj.studies.cells import interval_cell, mean_cell
 from socialnav_mj.studies.conditions import Comparison
@@ -103,30 +103,24 @@ def plant_page(
 
 
 def _verdicts(found: Sequence[Comparison]) -> list[str]:
-    rows = []
+    rows, n_told = [], 0
     for controller in found[0].controllers:
         for own in found:
             told = {scenario: verdict(own, scenario, controller) for scenario in own.scenarios}
+            n_told += sum(len(said) for said in told.values())
             texts = [
                 f"{SCENARIO_TITLES.get(s, s).split(':')[0]}: {', '.join(said)}" for s, said in told.items() if said
             ]
             rows.append([controller, own.recording, "; ".join(texts) or "nothing that these draws show"])
-    return [_how_many(found), "", *table(["controller", "recording", "told wrongly"], rows)]
-
-
-def _how_many(found: Sequence[Comparison]) -> str:
-    """How many statements could have been made, how many were, and how many chance alone would have made."""
-    possible = sum(
+    n_tests = sum(
         bool(np.isfinite((gap.low, gap.high)).all())
         for own in found
         for (_, _, condition, measure), gap in own.differences.items()
         if condition == IDEAL and measure in JUDGED
     )
-    made = sum(
-        len(verdict(own, scenario, name)) for own in found for scenario in own.scenarios for name in own.controllers
-    )
-    chance = f"were nothing told wrongly, chance would show some {0.05 * possible:.0f}"
-    return f"Told wrongly: {made} of {possible} numbers; {chance}."
+    chance = f"were nothing told wrongly, chance would show some {(1.0 - CONFIDENCE) * n_tests:.0f}"
+    how_many = f"Told wrongly: {n_told} of {n_tests} numbers; {chance}."
+    return [how_many, "", *table(["controller", "recording", "told wrongly"], rows)]
 
 
 def _scenario(own: Comparison, scenario: str) -> list[str]:
